@@ -242,17 +242,25 @@ def _link(
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
         link[Link.SLOTS] = len(part.slots)
-        spoken = [*part.templates, *chain(*part.strides), *map(len, part.slots), *chain(*part.slots)]
-        link[Link.ENDINGS] = len(part.actions) + len(spoken)
-        tables = np.array([*part.actions, *spoken, *part.outcomes, *part.successes, *part.looks], np.int32)
+        tables = [*part.actions]
+        for place, table in (
+            (Link.TEMPLATE_AT, part.templates),
+            (Link.STRIDE_AT, [*chain(*part.strides)]),
+            (Link.SIZE_AT, [*map(len, part.slots)]),
+            (Link.WORD_AT, [*chain(*part.slots)]),
+            (Link.ENDING_AT, part.outcomes),
+            (Link.SUCCESS_AT, part.successes),
+            (Link.LOOK_AT, part.looks),
+        ):
+            link[place] = len(part.words) + len(link) + len(tables)
+            tables += table
         own = _with_tokens(part)
         entities = int(own[Header.ENTITIES])
         link[Link.MORE], link[Link.LOOKS] = _more(parts), len(part.looks)
-        link[Link.LOOK_TABLE] = len(own) - entities * len(part.looks)
-        link[Link.LOOK_PLACES] = len(own) + len(link) + len(tables) - len(part.looks)
+        link[Link.LOOK_REGISTER_AT] = len(own) - entities * len(part.looks)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
         own[Header.FLAGS] |= _traits(own) | shown
-        words += [own, link, tables]
+        words += [own, link, np.array(tables, np.int32)]
         offsets.append(offset)
         first_counters.append(counter)
         offset += len(part.words) + len(link) + len(tables)

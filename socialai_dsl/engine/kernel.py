@@ -38,13 +38,6 @@ def _keep_final(book: Any, row: int) -> None:
 
 
 @inline
-def _how_it_ended(row: Row) -> int:
-    """Where the batch's number of how the episode ended is in the words of the program."""
-    link = row.program[Header.SIZE]
-    return link + Link.END + row.program[link + Link.ENDINGS] + row.registers[Register.OUTCOME]
-
-
-@inline
 def _pool_size(key: NDArray[np.uint64]) -> int:
     """How many programs a row may play."""
     return np.int64((key[Key.POOL] >> np.uint64(32)) & np.uint64(0x7FFFFFFF))
@@ -59,7 +52,8 @@ def _plays_acts(key: NDArray[np.uint64]) -> bool:
 @inline
 def _is_success(row: Row) -> bool:
     """Whether the program ended with a success."""
-    return row.program[_how_it_ended(row) + row.program[row.program[Header.SIZE] + Link.OUTCOMES]] != 0
+    table = row.program[row.program[Header.SIZE] + Link.SUCCESS_AT]
+    return row.program[table + row.registers[Register.OUTCOME]] != 0
 
 
 @outline
@@ -119,7 +113,8 @@ def _report_nothing(book: Any, row: int) -> None:
 
 @inline
 def _report_end(book: Any, row: int, opened: Row) -> None:
-    int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[_how_it_ended(opened)]
+    table = opened.program[opened.program[Header.SIZE] + Link.ENDING_AT]
+    int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[table + opened.registers[Register.OUTCOME]]
     success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
     bytes_of(book, Book.SUCCESS, ZERO)[row] = np.int64(success)
     bytes_of(book, Book.ENDED, ZERO)[row] = 1
@@ -137,7 +132,7 @@ def _actions_fit(book: Any, rows: int) -> bool:
     primitives = np.uint64(program[link + Link.ACTIONS])
     templates = np.uint64(program[link + Link.TEMPLATES])
     slots = program[link + Link.SLOTS]
-    sizes = link + Link.END + program[link + Link.ACTIONS] + program[link + Link.TEMPLATES] * (2 + slots)
+    sizes = program[link + Link.SIZE_AT]
     actions = uint64_of(book, Book.FLAT_ACTIONS, ZERO)
     wrong = False
     for i in range(0, (3 + slots) * rows, 3 + slots):

@@ -191,11 +191,11 @@ def _shows(row: Row, place: int, entity: int) -> bool:
 def _show_looks(row: Row, link: int, extra: NDArray[np.uint8], place: int, entity: int) -> None:
     """Show the looks of what is seen at a place of the picture."""
     looks, more = row.program[link + Link.LOOKS], row.program[link + Link.MORE]
-    base = row.program[link + Link.LOOK_TABLE] + looks * entity
+    base = row.program[link + Link.LOOK_REGISTER_AT] + looks * entity
     for k in range(looks):
         register = row.program[base + k]
         shown = row.registers[register] if register != 0 else np.int64(NO_GESTURE)
-        extra[more * place + row.program[row.program[link + Link.LOOK_PLACES] + k]] = shown
+        extra[more * place + row.program[row.program[link + Link.LOOK_AT] + k]] = shown
 
 
 @inline

@@ -72,23 +72,22 @@ def _encode_line(row: Row, link: int, line: int) -> None:
     nouns = program[Header.NOUNS]
     if line == 0 or program[Header.AGENT_SAYS] == 0 or not 0 <= pair < program[Header.TEMPLATES] * nouns:
         return
-    table = link + Link.END + program[link + Link.ACTIONS]
+    table = program[link + Link.TEMPLATE_AT]
     template = _index_of(program, table, program[link + Link.TEMPLATES], pair // nouns)
-    strides = table + program[link + Link.TEMPLATES]
-    if template >= 0 and _encode_words(row, link, strides, template, pair % nouns):
+    if template >= 0 and _encode_words(row, link, template, pair % nouns):
         action[1] = 1
         action[2] = template
 
 
 @outline
-def _encode_words(row: Row, link: int, strides: int, template: int, filling: int) -> bool:
+def _encode_words(row: Row, link: int, template: int, filling: int) -> bool:
     """Write the words in the slots of a template; whether the batch has them all."""
     stay_outline()
     program = row.program
     slots = program[link + Link.SLOTS]
-    sizes = strides + program[link + Link.TEMPLATES] * (1 + slots)
-    words = sizes + slots
-    strides += template * (1 + slots)
+    sizes = program[link + Link.SIZE_AT]
+    words = program[link + Link.WORD_AT]
+    strides = program[link + Link.STRIDE_AT] + template * (1 + slots)
     filling -= program[strides]
     sayable = True
     for slot in range(slots):

@@ -56,12 +56,9 @@ class Key(IntEnum):
 
 
 class Link(IntEnum):
-    """Words that follow a program in a batch.
+    """Words that follow a program in a batch. Right after them: for each action of the batch the program's own.
 
-    After them: for each action and template of the batch the program's own (-1 if it has none); for each template
-    what a filling is without its slots, and what the word of each slot counts (0 if the template lacks it); how many
-    words each slot has; for each word of each slot the program's own; for each outcome of the program the batch's, then
-    whether each is a success; for each look its channel.
+    Those that end in AT are addresses in the words of the program.
     """
 
     NUMBER = 0  # of the program in the batch
@@ -72,14 +69,19 @@ class Link(IntEnum):
     ACTIONS = 5  # choices of the batch's action space
     TEMPLATES = 6
     SLOTS = 7
-    ENDINGS = 8  # words before those of outcomes
-    FIRST_ROLLING = 9  # the first and the last entity that may ever roll
-    LAST_ROLLING = 10
-    MORE = 11  # channels of the batch behind the fourth
-    LOOKS = 12  # how many looks the program shows
-    LOOK_TABLE = 13  # where the register of each look of each entity is
-    LOOK_PLACES = 14  # where the channel of each look is, counted from the fifth
-    END = 15
+    FIRST_ROLLING = 8  # the first and the last entity that may ever roll
+    LAST_ROLLING = 9
+    MORE = 10  # channels of the batch behind the fourth
+    LOOKS = 11  # how many looks the program shows
+    TEMPLATE_AT = 12  # for each template of the batch the program's own; -1 if it has none
+    STRIDE_AT = 13  # for each template its filling without slots, and what the word of each slot counts
+    SIZE_AT = 14  # for each slot how many words it has in the batch
+    WORD_AT = 15  # for each word of each slot the program's own; -1 if it has none
+    ENDING_AT = 16  # for each way to end the batch's own
+    SUCCESS_AT = 17  # for each way to end whether it is a success
+    LOOK_AT = 18  # for each look its channel, counted from the fifth
+    LOOK_REGISTER_AT = 19  # for each entity the register of each look
+    END = 20
 
 
 class Trait(IntEnum):

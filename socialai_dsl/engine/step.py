@@ -50,13 +50,13 @@ def be_silent(row: Row) -> None:
 
 
 @inline
-def _filling(row: Row, link: int, strides: int) -> int:
+def _filling(row: Row, link: int) -> int:
     """The number of the words in all slots of what the agent says; -1 if the program lacks one of them."""
     program = row.program
     slots = program[link + Link.SLOTS]
-    sizes = strides + program[link + Link.TEMPLATES] * (1 + slots)
-    words = sizes + slots
-    strides += row.action[2] * (1 + slots)
+    sizes = program[link + Link.SIZE_AT]
+    words = program[link + Link.WORD_AT]
+    strides = program[link + Link.STRIDE_AT] + row.action[2] * (1 + slots)
     filling = program[strides]
     lacks = False
     for slot in range(slots):
@@ -74,13 +74,11 @@ def decode(row: Row, link: int) -> None:
     """Note the agent's body action and utterance. What its grammar cannot say is silence."""
     registers = row.registers
     program = row.program
-    table = link + Link.END
-    registers[Register.ACTION] = program[table + row.action[0]]
+    registers[Register.ACTION] = program[link + Link.END + row.action[0]]
     be_silent(row)
     if row.action[1] == 1:
-        table += program[link + Link.ACTIONS]
-        template = program[table + row.action[2]]
-        filling = _filling(row, link, table + program[link + Link.TEMPLATES])
+        template = program[program[link + Link.TEMPLATE_AT] + row.action[2]]
+        filling = _filling(row, link)
         if template >= 0 and filling >= 0:
             pair = template * program[Header.NOUNS] + filling
             registers[Register.TEMPLATE] = template
