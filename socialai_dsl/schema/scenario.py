@@ -109,7 +109,7 @@ SlotType = Literal[
 ]
 
 Probability = Annotated[
-    float, BeforeValidator(lambda v: float(v) if type(v) is int else v), Field(ge=0, le=1)
+    float, Field(ge=0, le=1), BeforeValidator(lambda v: float(v) if type(v) is int else v)
 ]
 
 
@@ -609,9 +609,9 @@ class Reward(Model):
     """The reward: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
 
     success: str = Field("linear(0.9)", description="linear(s), the part s that is lost by the horizon")
-    each_step: Annotated[float, BeforeValidator(lambda v: float(v) if type(v) is int else v)] = Field(
-        0.0, ge=-1, le=1, description="added to the reward of every step"
-    )
+    each_step: Annotated[
+        float, Field(ge=-1, le=1), BeforeValidator(lambda v: float(v) if type(v) is int else v)
+    ] = Field(0.0, description="added to the reward of every step")
 
 
 class SungWith(Model):
