@@ -661,11 +661,11 @@ def _counts_only_right_items(finding: _Finding) -> bool:
 
 def _bound(finding: _Finding) -> str:
     context = finding.context
-    if "ge" in context:
-        return f"too small; at least {context['ge']} is expected"
-    if "gt" in context:
-        return f"too small; more than {context['gt']} is expected"
-    return f"too large; at most {context.get('le', context.get('lt'))} is expected"
+    key = next(key for key in ("ge", "gt", "le", "lt") if key in context)
+    bound = context[key]
+    number = int(bound) if bound == int(bound) else bound
+    limits = {"ge": "too small; at least", "gt": "too small; more than", "le": "too large; at most"}
+    return f"{limits.get(key, 'too large; at most')} {number} is expected"
 
 
 def _as_share(value: object, most: object) -> str | None:
