@@ -1721,6 +1721,64 @@ def test_5_72_a_value_about_each_of_those_is_computed_for_each_of_them_alone(pla
     assert run.state["state"]["seen"] == {"balls[0]": 1, "balls[1]": 0, "balls[2]": 3}
 
 
+TO_ONE = """
+    overheard: {overheard}
+    grammar:
+      templates: ["<whom>, come", Hello]
+      slots: {{whom: [ann, bob]}}
+      to: <whom>
+    frames:
+      listen:
+        let: {{mine: 0, others: 0}}
+        states:
+          s:
+            then:
+              - {{hears: any, addressed: true, set: {{mine: "min(mine + 1, 9)"}}, say: Yes, to: agent}}
+              - {{hears: any, addressed: false, set: {{others: "min(others + 1, 9)"}}}}
+      tell: {{states: {{s: {{then: [{{when: t == 2, say: Psst, to: bob}}]}}}}}}
+    cast:
+      cal: {{at: [3, 5], frame: tell}}
+      ann: {{at: [4, 5], frame: listen}}
+      bob: {{at: [5, 5], frame: listen}}
+"""
+
+
+def _noticed(run: Play) -> list[int]:
+    return [run.value(f"{name}.{which}") for name in ("ann", "bob") for which in ("mine", "others")]
+
+
+def test_5_73_addressed_is_what_is_said_to_the_member(play: Folder) -> None:
+    run = play(TO_ONE.format(overheard="true"))
+    assert run.step(None, "Ann, come").info["utterance"] == "Ann to Agent: Yes"
+    assert _noticed(run) == [1, 0, 0, 1]
+    assert run.step().info["utterance"].splitlines() == ["Cal to Bob: Psst", "Bob to Agent: Yes"]
+    assert _noticed(run) == [1, 1, 1, 1]
+    run.step(None, "Hello")
+    assert [run.value("ann.mine"), run.value("bob.mine")] == [1, 1]
+
+
+def test_5_74_what_is_said_to_one_nobody_else_hears_unless_it_is_overheard(play: Folder) -> None:
+    run = play(TO_ONE.format(overheard="false")).step(None, "Ann, come")
+    assert _noticed(run) == [1, 0, 0, 0]
+    assert run.step().info["utterance"] == "Bob to Agent: Yes"
+    assert _noticed(run) == [1, 0, 1, 0]
+    assert _noticed(run.step(None, "Hello")) == [1, 1, 1, 1]
+
+
+def test_5_75_what_is_said_to_a_member_that_is_not_found_is_not_said(play: Folder) -> None:
+    run = play("""
+        frames:
+          tell:
+            states:
+              s:
+                then:
+                  - {say: You, to: first(c in cast where c.x > 2 and c != self)}
+                  - {say: Nobody}
+        cast: {ann: {at: [5, 5], frame: tell}}
+    """)
+    assert run.step().info["utterance"] == "Ann: Nobody"
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -131,7 +131,16 @@ SPOKEN_OF = (
         "start: none",
         "toggled_by(",
     ),
-    *("from:", "forget:", "start: none", "for: cast", ": [those(", "(those("),
+    *(
+        "from:",
+        "forget:",
+        "start: none",
+        "for: cast",
+        "(those(",
+        "addressed: true",
+        "overheard: false",
+        " to: ",
+    ),
     *("timer:", "exclusive: true", "unlocks:", "opens:", "inside:", "pushed_by:", "locked:", "tagged:"),
     *(
         "carryable: true",

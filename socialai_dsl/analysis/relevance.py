@@ -17,6 +17,7 @@ from socialai_dsl.program import (
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    SECRET,
     TEMPORARY,
     TESTS,
     Field,
@@ -250,4 +251,4 @@ def _reads_at(drawn: set[int], op: Op, position: int, operands: tuple[int, int, 
 
 
 def _lines_are_triggers(program: Program) -> bool:
-    return bool((program.table(Header.LINE_AT)[:, LineColumn.CLASS] > 1).any())
+    return bool((program.table(Header.LINE_AT)[:, LineColumn.CLASS] % SECRET > 1).any())

@@ -403,6 +403,7 @@ class Lines:
         -1 nothing. tokens: ids of its words.
         agent_says: 1 + number of the agent's utterance (0, 0) where the agent's utterances are lines; else 0.
         speakers: for each entity that says something, the numbers of its lines.
+        kept_secret: the lines that the agent never hears, for they are said to others.
     """
 
     checked: CheckedScenario
@@ -413,9 +414,10 @@ class Lines:
     tokens: list[list[int]] = field(default_factory=list)
     agent_says: int = 0
     speakers: dict[int, set[int]] = field(default_factory=dict)
+    kept_secret: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self._known: dict[tuple[int, tuple[str | Term, ...]], int] = {}
+        self._known: dict[tuple[int, tuple[str | Term, ...], Term | None], int] = {}
         self.grammar = self.checked.sentences.by_number()
         self.vocabulary = ("<pad>", "<unk>", *self.checked.words_in_order)
         self._ids = {word: number for number, word in enumerate(self.vocabulary)}
@@ -430,15 +432,18 @@ class Lines:
             self.classes[line] = self.classes_of.of_pair[k]
             self.nouns[line] = self._noun_of_pair(k)
 
-    def _append(self, speaker: Entity, pieces: Sequence[str]) -> int:
-        """A line of its pieces: the tone if the speaker has one, the name, the text."""
+    def _append(self, speaker: Entity, pieces: Sequence[str], to: tuple[int, str] | None = None) -> int:
+        """A line of its pieces: the tone if the speaker has one, the name, the text; `to`: the member addressed."""
         *before, name = pieces[: len(_before(speaker))]
         tone = "".join(f"({word}) " for word in before)
         text = "".join(pieces[1 + len(before) :])
+        name = f"{name} to {to[1]}" if to else name
         heard = f"{name}: {tone}{text}" if self.checked.names_shown else f"{tone}{text}"
         line = len(self.texts)
         self.texts.append(heard)
-        self.classes.append(self.classes_of.of_text(text))
+        self.classes.append(self.classes_of.of_text(text, to[0] if to else None))
+        if to and to[0] != 0 and not self.checked.overheard:
+            self.kept_secret.add(line)
         self.nouns.append(self.classes_of.noun_in(text))
         # A text without a single word still has to be heard as something.
         self.tokens.append([self._ids.get(word, UNKNOWN) for word in words(heard)] or [UNKNOWN])
@@ -457,6 +462,7 @@ class Lines:
         """Number all lines as `other` does, which was made for the same scenario."""
         self.texts, self.classes, self.nouns = [*other.texts], [*other.classes], [*other.nouns]
         self.tokens, self._known = [*other.tokens], dict(other._known)
+        self.kept_secret = set(other.kept_secret)
         self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
 
     def said_by(self, speaker: int, pattern: Pattern | None) -> frozenset[int]:
@@ -471,12 +477,12 @@ class Lines:
             numbers = [number for number in self._utterances(line) if number is not None]
             return min(numbers), max(numbers)
         pieces = (*_before(speaker), *line.parts)
-        first = self._family(speaker, pieces)
-        return first, first + _number_of(pieces, speaker) - 1
+        first = self._family(speaker, pieces, line)
+        return first, first + _number_of(pieces, speaker, line) - 1
 
     def speak(self, to: Expressions, speaker: Entity, line: int, said: Line) -> None:
         """Emit that `speaker` says a line, whose number is in an operand."""
-        self._speak(to, speaker, line, _number_of((*_before(speaker), *said.parts), speaker))
+        self._speak(to, speaker, line, _number_of((*_before(speaker), *said.parts), speaker, said))
 
     def _speak(self, to: Expressions, speaker: Entity, line: int, of: int) -> None:
         """Emit that `speaker` says one of so many lines in its present tone; note it if a condition reads it."""
@@ -501,8 +507,10 @@ class Lines:
         if speaker.number == 0:
             return self._utterance(to, line)
         pieces = (*_before(speaker), *line.parts)
-        first = self._family(speaker, pieces)
+        first = self._family(speaker, pieces, line)
         varying = [part for part in pieces if not isinstance(part, str | Const) and part is not speaker.tone]
+        if line.to is not None and not isinstance(line.to.term, Const):
+            return self._said_to(to, [*varying, line.to.term], line.to, first)
         return self._index(to, varying, first)
 
     def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
@@ -558,13 +566,36 @@ class Lines:
             return constant(first)
         return result if first == 0 else to.into_temporary(Op.ADD, result, constant(first))
 
-    def _family(self, speaker: Entity, parts: tuple[str | Term, ...]) -> int:
-        """Number of the first of all lines that these parts can make; the last varying part changes fastest."""
-        key = (speaker.number, parts)
+    @staticmethod
+    def _said_to(to: Expressions, varying: Sequence[Term], addressee: terms.Sited, first: int) -> int:
+        """The operand of a line that is said to one of several."""
+        *others, member = varying
+        size = member.type.size
+        index = Lines._index(to, others, 0)
+        if others:
+            index = to.into_temporary(Op.MUL, index, constant(size))
+        to.site = addressee.site
+        who = to.into_temporary(Op.MAX, to.value(member), constant(member.type.low))
+        who = to.into_temporary(Op.MIN, who, constant(member.type.high))
+        if others:
+            who = to.into_temporary(Op.ADD, who, index)
+        return to.into_temporary(Op.ADD, who, constant(first - member.type.low))
+
+    def _family(self, speaker: Entity, parts: tuple[str | Term, ...], line: Line | None = None) -> int:
+        """Number of the first of all lines that these parts can make; the last varying part changes fastest, and who is
+        addressed faster still.
+        """
+        to = line.to if line is not None else None
+        key = (speaker.number, parts, to.term if to is not None else None)
         if key not in self._known:
             self._known[key] = len(self.texts)
             for pieces in product(*(_choices(part) for part in parts)):
-                self._append(speaker, pieces)
+                for who in [None] if to is None else terms.numbers_of(to.term):
+                    self._append(
+                        speaker,
+                        pieces,
+                        None if who is None or line is None else (who, dict(line.called)[who]),
+                    )
         return self._known[key]
 
     def _utterance(self, to: Expressions, line: Line) -> int:
@@ -633,9 +664,10 @@ def _before(speaker: Entity) -> tuple[str | Term, ...]:
     return (speaker.name or "",) if speaker.tone is None else (speaker.tone, speaker.name or "")
 
 
-def _number_of(pieces: tuple[str | Term, ...], speaker: Entity) -> int:
-    """How many lines pieces make in each tone of the speaker."""
-    return prod(len(_choices(part)) for part in pieces if part is not speaker.tone)
+def _number_of(pieces: tuple[str | Term, ...], speaker: Entity, line: Line | None = None) -> int:
+    """How many lines pieces make in each tone of the speaker, to all that may be addressed."""
+    members = 1 if line is None or line.to is None else line.to.term.type.size
+    return members * prod(len(_choices(part)) for part in pieces if part is not speaker.tone)
 
 
 def _choices(part: str | Term) -> tuple[str, ...]:

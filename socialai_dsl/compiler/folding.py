@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from itertools import product
 from typing import Any, TypeVar, assert_never
 
 from socialai_dsl.grammar.ast import children, every, rebuilt
 from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity, RulePlan, StepPlan
+from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import (
     BOOL,
     Const,
     HeardNoun,
+    Line,
     Pattern,
     Speaker,
     Term,
@@ -54,12 +57,22 @@ class Classes:
             self._nouns[normal(text)] = checked.sentences.both(known, noun)
         self._numbers: dict[frozenset[int], int] = {frozenset(): OTHER}
         self._texts = [frozenset(normal(text) for text in pattern.said_by_npcs) for pattern in self.patterns]
+        self._addressees = _Addressees(checked)
         nouns = checked.sentences.fillings
         pairs = range(len(checked.sentences.templates) * nouns)
-        self.of_pair = [self._number(self._of_pair(k, nouns)) for k in pairs]
+        self.of_pair = [
+            self._number(
+                self._addressees.joined(self._of_pair(k, nouns), self._addressees.of_filling(k % nouns))
+            )
+            for k in pairs
+        ]
         for texts in self._texts:
             for text in sorted(texts):
                 self.of_text(text)
+        for line in every(Line, checked):
+            if line.to is not None:
+                for text, number in product(texts_of(line), numbers_of(line.to.term)):
+                    self.of_text(text, number)
         performs = any(activity.name == "perform" for activity in every(Activity, checked.frames))
         self.of_performed = [
             self._number(self._of_pair(k, nouns) | self._of_text(text))
@@ -70,9 +83,9 @@ class Classes:
     def _number(self, signature: frozenset[int]) -> int:
         return self._numbers.setdefault(signature, len(self._numbers) + 1)
 
-    def of_text(self, text: str) -> int:
-        """Class of what an NPC says."""
-        return self._number(self._of_text(text))
+    def of_text(self, text: str, to: int | None = None) -> int:
+        """Class of what an NPC says, perhaps to somebody."""
+        return self._number(self._addressees.joined(self._of_text(text), to))
 
     def _of_text(self, text: str) -> frozenset[int]:
         return frozenset(i for i, texts in enumerate(self._texts) if normal(text) in texts)
@@ -83,7 +96,11 @@ class Classes:
     def matching(self, pattern: Pattern) -> frozenset[int]:
         """The classes whose utterances fit the pattern."""
         position = self.patterns.index(pattern)
-        return frozenset(number for signature, number in self._numbers.items() if position in signature)
+        return frozenset(
+            number
+            for signature, number in self._numbers.items()
+            if position in signature and self._addressees.hears(pattern, signature)
+        )
 
     def noun_in(self, text: str) -> int:
         """The filling that patterns find in what an NPC says."""
@@ -113,6 +130,41 @@ class Classes:
     def count(self) -> int:
         """Number of classes, silence included."""
         return len(self._numbers) + 1
+
+
+class _Addressees:
+    """Whom utterances address: of an addressed one the signature has, besides its patterns, -1 - the member's number.
+
+    Attributes:
+        anybody: whether anybody may be addressed.
+    """
+
+    def __init__(self, checked: CheckedScenario) -> None:
+        self._slot, self._words = checked.addressing or ("", ())
+        self._checked = checked
+        self.anybody = any(pattern.hearer is not None for pattern in every(Pattern, checked))
+
+    def of_filling(self, filling: int) -> int | None:
+        """The member whom a sentence of the agent addresses."""
+        sentences = self._checked.sentences
+        for slot, stride in zip(sentences.slots, sentences.strides, strict=True):
+            if slot.name == self._slot:
+                digit = filling // stride % (len(slot.words) + 1)
+                return self._words[digit] if digit < len(self._words) else None
+        return None
+
+    def joined(self, patterns: frozenset[int], to: int | None) -> frozenset[int]:
+        """The signature of an utterance."""
+        return patterns | {-1 - to} if self.anybody and to is not None and patterns else patterns
+
+    def hears(self, pattern: Pattern, signature: frozenset[int]) -> bool:
+        """Whether the ears of a pattern hear what has this signature, and want to."""
+        if pattern.hearer is None:
+            return True
+        to = next((-1 - part for part in signature if part < 0), None)
+        if to not in (None, pattern.hearer) and not self._checked.overheard:
+            return False
+        return pattern.addressed in (None, to == pattern.hearer)
 
 
 # -- terms simplified by what is known when a rule is looked at: this sorts rules by trigger -----------------

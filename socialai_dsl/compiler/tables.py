@@ -27,6 +27,7 @@ from socialai_dsl.program import (
     FIRST_ENTITY,
     MAX_SIDE,
     NO_GESTURE,
+    SECRET,
     TESTS,
     EntityColumn,
     EntityName,
@@ -207,11 +208,13 @@ class Tables:
         words = []
         first_token = 0
         lines = self.lines
-        for tokens, number, noun in zip(lines.tokens, lines.classes, lines.nouns, strict=True):
+        for line, (tokens, number, noun) in enumerate(
+            zip(lines.tokens, lines.classes, lines.nouns, strict=True)
+        ):
             row = {
                 LineColumn.FIRST_TOKEN: first_token,
                 LineColumn.TOKENS: len(tokens),
-                LineColumn.CLASS: number,
+                LineColumn.CLASS: number + (SECRET if line in lines.kept_secret else 0),
                 LineColumn.NOUN: noun,
             }
             words += [row[column] for column in LineColumn if column != LineColumn.COLUMNS]
@@ -701,7 +704,10 @@ def _lines(program: Program) -> None:
             count * (h(Header.LOG_SIZE) + 1) > h(Header.TOKENS),
             f"the log cannot hold line {number} often enough",
         )
-        _require(1 <= heard_as < h(Header.CLASSES), f"line {number} has no utterance class")
+        _require(
+            1 <= heard_as % SECRET < h(Header.CLASSES) and heard_as < 2 * SECRET,
+            f"line {number} has no utterance class",
+        )
         _require(-1 <= noun < h(Header.NOUNS), f"line {number} has a noun that does not exist")
         tokens = program.words[h(Header.TOKEN_AT) + first : h(Header.TOKEN_AT) + first + count]
         known = bool(((tokens >= 1) & (tokens < len(program.vocabulary))).all())

@@ -5,7 +5,7 @@ from socialai_dsl.engine.entities import column, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.rng import fold
 from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
-from socialai_dsl.program import EntityColumn, Field, Flag, FrameColumn, Header, LineColumn, Register
+from socialai_dsl.program import SECRET, EntityColumn, Field, Flag, FrameColumn, Header, LineColumn, Register
 
 
 @inline
@@ -201,8 +201,14 @@ def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
 @inline
 def speak(row: Row, speaker: int, line: int) -> None:
     """An NPC says a line: the agent hears it if it may and is near, and so do NPCs for whom it means something."""
-    if _agent_may_hear(row, speaker) and is_present(row, AGENT) and within_earshot(row, speaker, AGENT):
-        hear(row, line)
     utterance = _line(row, line, LineColumn.CLASS)
+    if (
+        utterance < SECRET
+        and _agent_may_hear(row, speaker)
+        and is_present(row, AGENT)
+        and within_earshot(row, speaker, AGENT)
+    ):
+        hear(row, line)
+    utterance &= SECRET - 1
     if utterance > 1:
         deliver(row, speaker, utterance, _line(row, line, LineColumn.NOUN))

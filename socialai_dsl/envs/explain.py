@@ -23,6 +23,7 @@ from socialai_dsl.program import (
     CELL,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    SECRET,
     EntityColumn,
     Field,
     Flag,
@@ -346,7 +347,7 @@ class _Notes:
         table = program.table(Header.LINE_AT)
         first, heard = program.header(Header.HEARD), int(self.registers[Register.HEARD])
         lines = [int(line) for line in self.registers[first : first + heard]]
-        fitting = np.flatnonzero(table[:, LineColumn.CLASS] == number).tolist()
+        fitting = np.flatnonzero(table[:, LineColumn.CLASS] % SECRET == number).tolist()
         told = [line for line in lines if line in fitting] or fitting
         return program.lines[told[0]] if len(told) == 1 else "something else"
 

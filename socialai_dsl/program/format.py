@@ -10,6 +10,8 @@ VERSION = 2
 TEMPORARY = 8192
 TEMPORARIES = 64
 CONSTANT = 1 << 20
+SECRET = 1 << 16
+"""Added to the class of a line that the agent never hears: it is said to others alone."""
 BOARDS = 8
 """Scratch boards (sets of cells) that reset code may use."""
 
@@ -225,7 +227,7 @@ class LineColumn(IntEnum):
 
     FIRST_TOKEN = 0
     TOKENS = 1
-    CLASS = 2  # utterance class to NPCs that hear it, 1 if no rule waits for it
+    CLASS = 2  # utterance class to NPCs that hear it, 1 if no rule waits for it; SECRET more if the agent never does
     NOUN = 3  # the filling that a pattern with slots finds in it; -1 none
     COLUMNS = 4
 

@@ -123,6 +123,7 @@ class Effects(Model):
     say: TextLine | None = Field(
         None, description="a text to say; <...> puts a value in", examples=["The <exit.color> door"]
     )
+    to: Expression | None = Field(None, description="the member who is addressed", examples=["speaker"])
 
 
 class Rule(Effects):
@@ -130,6 +131,7 @@ class Rule(Effects):
 
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
     hears: Texts = Field((), description="an utterance, or a list of alternatives")
+    addressed: bool | None = Field(None, description="of `hears`: only what is said to it, or only the rest")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
     after: Expression | None = Field(None, description="holds from this turn in the state on")
     chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
@@ -263,6 +265,11 @@ class Frame(Model):
     def has_nested_steps(self) -> bool:
         """Whether some entries of `steps` are nested."""
         return any(step.steps is not None for step in self.steps or ())
+
+    def all_effects(self) -> Iterator[Effects]:
+        """Every rule and entry."""
+        yield from (step for _, step in self.entries())
+        yield from (rule for state in (self.states or {}).values() for rule in state.rules)
 
     def entries(self) -> Iterator[tuple[DataPath, Step]]:
         """The entries of `steps`, nested ones in their place, each with where it is written in the frame."""
@@ -513,10 +520,15 @@ class UtteranceGrammar(Model):
     slots: dict[Word, Fillers] = Field(
         default_factory=dict,
         max_length=8,
-        description=(
-            "in place of `nouns`, name: the values of <name>: words, things, members of the cast, `colors`, 1..6"
-        ),
+        description="in place of `nouns`, name: the values of <name>: words, things, members, `colors`, 1..6",
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
+    )
+    to: Annotated[str, StringConstraints(pattern=r"^<[A-Za-z_][A-Za-z0-9_]*>$", max_length=42)] | None = (
+        Field(
+            None,
+            description="the slot whose member of the cast is addressed by what is said",
+            examples=["<whom>"],
+        )
     )
 
 
@@ -663,6 +675,7 @@ class Scenario(Model):
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
     earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
+    overheard: bool = Field(True, description="whether others within earshot hear what is said to one")
     actions: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
         PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
     )

@@ -9,7 +9,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import groups, hands, object_facts, rows, texts, those
+from socialai_dsl.semantics import addressing, groups, hands, object_facts, rows, texts, those
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.nesting import NestedPlanner
@@ -378,7 +378,14 @@ def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
             with surviving():
                 hearing = isinstance(entry, Rule) and bool(entry.hears)
                 scope = replace(_scope(played, (*path, "say"), f"{address}.say"), hearing=hearing)
-                spoken.lines[path] = texts.line(resolver, (*path, "say"), entry.say, scope)
+                line = texts.line(resolver, (*path, "say"), entry.say, scope)
+                if entry.to is not None:
+                    own = scope.at((*path, "to"), f"{scope.draws.site.removesuffix('.say')}.to")
+                    line = addressing.addressed(resolver, line, entry.to, own)
+                spoken.lines[path] = line
+        elif entry.to is not None:
+            span = resolver.findings.places.key_span((*path, "to"))
+            resolver.findings.error("S105", "`to` needs `say`: what is said to them", span)
     return spoken
 
 
@@ -550,6 +557,8 @@ class _Planner:
             with surviving():
                 scope = _scope(self.played, place, f"{address}.hears")
                 found.append(texts.heard_at(self.resolver, raw, scope))
+        if rule.addressed is not None:
+            return addressing.only(self.resolver, found, rule, path)
         return found
 
     def _after(

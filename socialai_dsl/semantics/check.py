@@ -10,7 +10,17 @@ from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
-from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, rows, setup, tables
+from socialai_dsl.semantics import (
+    addressing,
+    behaviour,
+    entities,
+    groups,
+    object_facts,
+    possible,
+    rows,
+    setup,
+    tables,
+)
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import Known, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
@@ -496,6 +506,8 @@ class _Run:
             npcs_hidden=scenario.observe.npcs == "hidden",
             picture_before_npcs=scenario.observe.image == "before_npcs",
             names_shown=scenario.observe.names == "shown",
+            addressing=addressing.of_slot(resolver) if scenario.grammar.to is not None else None,
+            overheard=scenario.overheard,
             own_voice=scenario.observe.own_voice,
             computed=computed,
             remembered=tuple(resolver.registers.remembered),

@@ -9,7 +9,7 @@ from itertools import pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
-from socialai_dsl.schema.scenario import Effects, Frame, Register, Scenario
+from socialai_dsl.schema.scenario import Register, Scenario
 from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.believing import Believed
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
@@ -142,7 +142,7 @@ def _sources(scenario: Scenario) -> dict[str, list[object]]:
     declared: list[Mapping[str, object]] = [scenario.let, scenario.define]
     declared += [member.with_ for name in scenario.cast for member in scenario.alternatives(name)]
     for _, frame in frames_of(scenario):
-        declared += [frame.let, frame.define, *(entry.set for entry in _entries(frame))]
+        declared += [frame.let, frame.define, *(entry.set for entry in frame.all_effects())]
     for mapping in declared:
         for name, source in mapping.items():
             value = source.start if isinstance(source, Register) else source
@@ -150,19 +150,12 @@ def _sources(scenario: Scenario) -> dict[str, list[object]]:
     return found
 
 
-def _entries(frame: Frame) -> Iterator[Effects]:
-    """Every rule and step of a frame."""
-    yield from (step for _, step in frame.entries())
-    for state in (frame.states or {}).values():
-        yield from state.rules
-
-
 def _effects(scenario: Scenario) -> Iterator[object]:
     """Every effect as it is written."""
     for rule in scenario.rules:
         yield from rule.cause
     for _, frame in frames_of(scenario):
-        for entry in _entries(frame):
+        for entry in frame.all_effects():
             yield from entry.cause
 
 

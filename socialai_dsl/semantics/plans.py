@@ -475,6 +475,7 @@ class CheckedScenario:
         accepting: members of the cast who do not take everything they are given, each with the path of the register
             that says whether it does.
         readings: how conditions were written; None if it was not made from a file.
+        addressing: a slot, and the member that each of its words addresses. overheard: whether others hear that.
     """
 
     name: str
@@ -507,3 +508,5 @@ class CheckedScenario:
     probes: tuple[ProbePlan, ...] = ()
     accepting: tuple[tuple[int, str], ...] = ()
     readings: Readings | None = field(default=None, compare=False, repr=False)
+    addressing: tuple[str, tuple[int, ...]] | None = None
+    overheard: bool = True

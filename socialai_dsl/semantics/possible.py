@@ -328,9 +328,13 @@ def _hears_all(above: RulePlan, below: RulePlan) -> bool:
         return True
     if not below.hears:
         return False
-    pairs = frozenset().union(*(p.pairs for p in above.hears))
-    texts = frozenset().union(*(p.said_by_npcs for p in above.hears))
-    return all(p.pairs <= pairs and p.said_by_npcs <= texts for p in below.hears)
+    for pattern in below.hears:
+        wider = [other for other in above.hears if other.addressed in (None, pattern.addressed)]
+        pairs = frozenset().union(*(other.pairs for other in wider))
+        texts = frozenset().union(*(other.said_by_npcs for other in wider))
+        if not (pattern.pairs <= pairs and pattern.said_by_npcs <= texts):
+            return False
+    return True
 
 
 def _asks_less(above: RulePlan, below: RulePlan) -> bool:

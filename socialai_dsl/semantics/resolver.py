@@ -150,12 +150,7 @@ class Utterances:
 def texts_of(line: Line) -> list[str]:
     """Every text that a line can be, in the order of its values; at most MAX_TEXTS."""
     choices = [[part] if isinstance(part, str) else words_of_values(part.type) for part in line.parts]
-    texts: list[str] = []
-    for chosen in product(*choices):
-        if len(texts) == MAX_TEXTS:
-            break
-        texts.append("".join(chosen))
-    return texts
+    return ["".join(chosen) for chosen in islice(product(*choices), MAX_TEXTS)]
 
 
 def number_of_texts(line: Line) -> int:
@@ -519,6 +514,7 @@ class Resolver(ABC):
         used: where the definitions and draws stand that something uses.
         missing_keys: table and word of what may be looked up and is not there, once it has been reported.
         slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
+        addresses: whether the agent or an NPC addresses somebody.
     """
 
     def __init__(
@@ -538,6 +534,8 @@ class Resolver(ABC):
         self.used: set[DataPath] = set()
         self.missing_keys: set[tuple[str, str]] = set()
         self.slot_words: dict[Term, tuple[FilledSlot, Term]] = {}
+        said_to = (entry.to for frame in frames.values() for entry in frame.model.all_effects())
+        self.addresses = symbols.scenario.grammar.to is not None or any(to is not None for to in said_to)
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}

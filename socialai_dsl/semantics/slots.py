@@ -76,14 +76,14 @@ def _entries(symbols: Symbols, raw: str | int, place: DataPath, findings: Findin
             yield word if things.single else f"{word} {i + 1}", entity(value)
     elif text in symbols.groups or text in symbols.roles or text in symbols.numbers:
         for member in symbols.groups.get(text) or (symbols.roles.get(text, text),):
-            yield _name(symbols, member, place, findings), entity(symbols.numbers[member])
+            yield name_of(symbols, member, place, findings), entity(symbols.numbers[member])
     else:
         if "<" in text or ">" in text:
             raise findings.fail("S104", "what stands in a slot has no slots itself", findings.at(place))
         yield text, Const(COLOR, COLORS.index(text)) if text in COLORS else None
 
 
-def _name(symbols: Symbols, member: str, place: DataPath, findings: Findings) -> str:
+def name_of(symbols: Symbols, member: str, place: DataPath, findings: Findings) -> str:
     """How others call a member of the cast, which has to be known to all."""
 
     def called(one: CastMember) -> str | None:

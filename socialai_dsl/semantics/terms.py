@@ -126,9 +126,7 @@ class Digit(Leaf):
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A fact of the world: t, width, height, action (the agent's this step), noun (the filling of its utterance this
-    step, or with `digit` one slot of it).
-    """
+    """A fact: t, width, height, action (the agent's this step), noun (the filling of what it says, or a slot of it)."""
 
     type: Type
     name: Literal["t", "width", "height", "action", "noun"]
@@ -285,9 +283,11 @@ class Pattern:
     pairs: frozenset[tuple[int, int]]
     text: str
     said_by_npcs: frozenset[str] = frozenset()
-    """Plain texts of NPCs (without speaker) that match as well."""
     nouns: tuple[tuple[str, int], ...] = ()
-    """Of a pattern with slots: the filling that it finds in each of those texts."""
+    """Plain texts of NPCs (without speaker) that match as well; with slots, the filling in each of them."""
+    hearer: int | None = None
+    addressed: bool | None = None
+    """Where members address each other: whose ears it is for, and if it has to be said to that member, or must not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -423,11 +423,13 @@ class Sited:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line: fixed pieces and values with words, joined; `site` for picks inside."""
+    """A line: fixed pieces and values with words, joined; `site` for picks inside. `to`: who is addressed."""
 
     parts: tuple[str | Term, ...]
     site: str
     span: Span
+    to: Sited | None = None
+    called: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,7 +80,7 @@ def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     return any_of(
         all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
         for text, drawn, span in texts(resolver, node, scope)
-        for pattern, given in patterns(resolver, text, scope, span, True)
+        for pattern, given in for_ears(resolver, patterns(resolver, text, scope, span, True), scope)
     )
 
 
@@ -440,9 +440,17 @@ _MOST_LISTED = 4
 def heard_at(resolver: Resolver, raw: str, scope: Scope) -> Alternative:
     """What a text of `hears:` stands for, which is written at the scope's path."""
     if raw == ANYTHING:
-        return [(resolver.utterances.anything(), None)]
+        return for_ears(resolver, [(resolver.utterances.anything(), None)], scope)
     text = resolver.findings.text(scope.path, raw)
-    return patterns(resolver, text, scope, resolver.findings.at(scope.path), True)
+    return for_ears(resolver, patterns(resolver, text, scope, resolver.findings.at(scope.path), True), scope)
+
+
+def for_ears(resolver: Resolver, heard: Alternative, scope: Scope) -> Alternative:
+    """The same as one member hears it, where it matters who is addressed."""
+    if not resolver.addresses or scope.member is None:
+        return heard
+    own = resolver.symbols.numbers[scope.member]
+    return [(replace(pattern, hearer=own), condition) for pattern, condition in heard]
 
 
 def on_hearing(heard: Sequence[Alternative], when: Sited | None, site: str, span: Span) -> Sited:
@@ -634,7 +642,8 @@ def _with_slots(resolver: Resolver, pattern: Pattern, asked: set[Digit | None]) 
     pairs = frozenset(pair for pair in pattern.pairs if _has(pair[1], asked))
     if not (pairs or fillings):
         return None
-    return Pattern(pairs, pattern.text, frozenset(text for text, _ in fillings), fillings)
+    texts = frozenset(text for text, _ in fillings)
+    return replace(pattern, pairs=pairs, said_by_npcs=texts, nouns=fillings)
 
 
 def _has(filling: int, asked: set[Digit | None]) -> bool:
@@ -733,6 +742,7 @@ def words_in_order(
         (word for name in names for word in words_of_values(name.type)),
         (text for said in lines.values() for line in said for text in _pieces(line)),
         (word for tone in tones if tone is not None for word in tone.type.words),
+        ("to" for said in lines.values() for line in said if line.to is not None),
     )
     return tuple(dict.fromkeys(word for text in texts for word in words(text)))
 

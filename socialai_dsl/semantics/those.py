@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Assignment
 from socialai_dsl.semantics.resolver import Resolver
@@ -65,6 +66,14 @@ def _mentions(node: ast.Node, variable: str) -> bool:
     return any(isinstance(part, ast.Name) and part.id == variable for part in ast.walk(node))
 
 
+def _is_about(raw: str, variable: str) -> bool:
+    """Whether a value as it is written speaks of a variable; a noun of several words does not."""
+    try:
+        return _mentions(parse_expression(raw), variable)
+    except ParseProblem:
+        return False
+
+
 def _among(item: Const, known: Sequence[Const]) -> bool:
     return any(item.type.kind == one.type.kind and item.value == one.value for one in known)
 
@@ -103,8 +112,7 @@ def assigned(
         name = resolver.symbols.word(strangers[0])
         message = f"there is no `{node.name}` for {name}, one of `{quoted(those.group)}`"
         raise resolver.fail("S204", message, those.group, own)
-    written = resolver.findings.expression(scope.path, raw) if isinstance(raw, str | int | bool) else None
-    each = written is not None and _mentions(written, those.var)
+    each = isinstance(raw, str) and _is_about(raw, those.var)
     for one in chosen:
         inner = one.scope.at(scope.path, scope.draws.site) if each else scope
         value = value_for(resolver, register, raw, replace(inner, draws=Draws(scope.draws.site)))

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import ParseProblem
 from tests.reference import geometry
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, key_of, of, something, there
 from tests.reference.source import Sources
@@ -123,6 +124,10 @@ def _variable(sources: Sources, written: str, source: Any, path: str, frame: str
     """The variable of `those(...)` in the key if the value speaks of it: then there is a value for each."""
     key = sources.expression(f"{path}.set.{written}.key", written, frame).tree if "(" in written else None
     if not isinstance(key, ast.Call) or source is None:
+        return None
+    try:
+        sources.expression(f"{path}.set.{written}", source, frame)
+    except ParseProblem:  # a noun of several words
         return None
     value, those = sources.expression(f"{path}.set.{written}", source, frame), key.args[0]
     variable = those.var.partition("~")[0] if isinstance(those, ast.Quantifier) else ""

@@ -23,6 +23,7 @@ class Consequence:
     registers: dict[str, Any] = field(default_factory=dict)
     causes: list[Cause] = field(default_factory=list)
     say: str | None = None
+    to: Entity | None = None
 
 
 @dataclass
@@ -34,6 +35,7 @@ class Turn:
     afterwards: Consequence | None = None
     say: str | None = None  # one utterance per turn: the first is kept
     filled: dict[str, Any] | None = None  # of a performed utterance
+    to: Entity | None = None  # who is addressed
 
 
 class FrameRunner:
@@ -99,10 +101,12 @@ class FrameRunner:
         if spoken:
             self.say(turn, *speech.pair(self.world, self.sources.scenario.grammar, spoken))
 
-    def say(self, turn: Turn, text: str, filled: dict[str, Any] | None = None) -> None:
+    def say(
+        self, turn: Turn, text: str, filled: dict[str, Any] | None = None, to: Entity | None = None
+    ) -> None:
         """The first thing that is said in a turn counts. That an NPC said it is known at once; it is heard later."""
         if turn.say is None:
-            turn.say, turn.filled = text, filled
+            turn.say, turn.filled, turn.to = text, filled, to
             if self.me.sort == "npc":
                 self.me.utterance = text
 
@@ -337,6 +341,8 @@ class FrameRunner:
             return context
         wanted = self.wanted(rule, path)
         for heard in speech.in_speaking_order(self.world, self.me.inbox):
+            if rule.addressed is not None and rule.addressed != (heard.to is self.me):
+                continue
             for number, source in enumerate(rule.hears):
                 captured: dict[str, Any] | None = {}
                 if source != "any":
@@ -359,7 +365,7 @@ class FrameRunner:
     def wanted(self, rule: Rule, path: str) -> list[str]:
         """The slots of what was heard that a rule asks for."""
         frame = self.me.frame
-        written = [rule.when, rule.do, *rule.set, *rule.set.values(), *rule.cause]
+        written = [rule.when, rule.do, rule.to, *rule.set, *rule.set.values(), *rule.cause]
         values = [
             self.expression(f"{path}.asked", source)
             for source in written
@@ -378,6 +384,8 @@ class FrameRunner:
         found.causes = causes(self.sources, rule, path, context, self.me.frame)
         if rule.say is not None:
             found.say = evaluate(self.sources.text(f"{path}.say", rule.say, self.me.frame), context)
+        if getattr(rule, "to", None) is not None:
+            found.to = there(evaluate(self.expression(f"{path}.to", rule.to), context))
         return found
 
     def perform(self, found: Consequence, turn: Turn) -> None:
@@ -387,7 +395,7 @@ class FrameRunner:
             for target in targets:
                 affect(self.world, target, verb, status)
         if found.say is not None:
-            self.say(turn, found.say)
+            self.say(turn, found.say, to=found.to)
         if isinstance(found.rule, Rule):
             goal = found.rule.goto or found.rule.goto_now
             if goal is not None:

@@ -19,7 +19,7 @@ from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
-from tests.reference.world import NOTHING, Entity, Kept, Performance, World, as_list
+from tests.reference.world import NOTHING, Entity, Heard, Kept, Performance, World, as_list
 
 Action = tuple[int, ...]
 ATTEMPTS = 64
@@ -91,6 +91,7 @@ class Reference:
             fillers=scenario.grammar.fillers,
             npcs_hidden=scenario.observe.npcs == "hidden",
             own_voice=scenario.observe.own_voice,
+            overheard=scenario.overheard,
             egocentric=scenario.observe.directions == "egocentric",
             occlusion=scenario.room.occlusion,
             gestures="pointing" in (scenario.observe.channels or ()),
@@ -188,7 +189,7 @@ class Reference:
         result.image = picture(world, self.canvas) if image is None else image
         result.words = [word for line in self.history for word in line]
         result.tokens = self.vocabulary.tokens(result.words)
-        result.heard = tuple(self.line(speaker, text) for speaker, text in world.lines)
+        result.heard = tuple(map(self.line, world.lines))
         return result
 
     def look_back(self) -> None:
@@ -258,8 +259,10 @@ class Reference:
     def utter(self, action: Action) -> None:
         """The agent speaks if it wants to."""
         if action[1]:
-            agent = self.world.agent
-            speech.speak(self.world, agent, *speech.pair(self.world, self.scenario.grammar, agent.pair))
+            agent, grammar = self.world.agent, self.scenario.grammar
+            text, filled = speech.pair(self.world, grammar, agent.pair)
+            to = filled.get(grammar.to[1:-1]) if grammar.to else None
+            speech.speak(self.world, agent, text, filled, to)
 
     def npc_turn(self, npc: Entity) -> None:
         """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
@@ -279,17 +282,21 @@ class Reference:
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
         if turn.say is not None:
-            speech.speak(self.world, npc, turn.say, turn.filled)
+            speech.speak(self.world, npc, turn.say, turn.filled, turn.to)
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
-        self.history += [speech.words(self.line(speaker, text)) for speaker, text in self.world.lines]
+        self.history += [speech.words(self.line(heard)) for heard in self.world.lines]
         while sum(map(len, self.history)) > self.vocabulary.length:
             self.history.pop(0)
 
-    def line(self, speaker: Entity, text: str) -> str:
-        """A line as it is heard: `Name: text`, or the text alone where names are hidden."""
-        return text if self.scenario.observe.names == "hidden" else f"{speaker.name}: {text}"
+    def line(self, heard: Heard) -> str:
+        """A line as it is heard: `Name: text`, `Name to Name: text`, or the text alone where names are hidden."""
+        if self.scenario.observe.names == "hidden":
+            return heard.text
+        # Whom the agent addresses is said by its words.
+        to = f" to {heard.to.name}" if heard.to is not None and heard.speaker.sort == "npc" else ""
+        return f"{heard.speaker.name}{to}: {heard.text}"
 
     def judge(self) -> Result:
         """How the step ended: deadly before everything, the first outcome that holds, then time."""

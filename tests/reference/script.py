@@ -40,6 +40,7 @@ class Rule:
 
     id: str | None = None
     hears: tuple[str, ...] = ()
+    addressed: bool | None = None
     when: Any = None
     after: Any = None
     chance: float | None = None
@@ -48,6 +49,7 @@ class Rule:
     set: dict[str, Any] = field(default_factory=dict)
     cause: tuple[str, ...] = ()
     say: str | None = None
+    to: Any = None
     goto: str | None = None
     goto_now: str | None = None
     reward: int = 0  # of the world's rules: per cent
@@ -64,6 +66,7 @@ class Step:
     set: dict[str, Any] = field(default_factory=dict)
     cause: tuple[str, ...] = ()
     say: str | None = None
+    to: Any = None
     when: Any = None
     steps: tuple[Step, ...] | None = None  # nested, in place of an activity
     repeat: Any = None
@@ -288,6 +291,7 @@ class Grammar:
     templates: tuple[str, ...]
     nouns: tuple[str | int, ...] = ()
     slots: dict[str, Any] = field(default_factory=dict)
+    to: str | None = None  # the slot of who is addressed, as it is written: `<whom>`
     fillers: dict[str, list[Filler]] = field(default_factory=dict)
 
     def utterance(self, template: int, *choices: int) -> str:
@@ -335,6 +339,7 @@ class Script:
     room: Room
     horizon: int = 100
     earshot: Any = "next_to"
+    overheard: bool = True
     actions: tuple[str, ...] = PRIMITIVES
     params: dict[str, Any] = field(default_factory=dict)
     order: tuple[str, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -90,8 +90,14 @@ def within_earshot(world: World, speaker: Entity, hearer: Entity) -> bool:
     return apart == 1 if reach == "next_to" else apart <= int(reach)
 
 
-def speak(world: World, speaker: Entity, text: str, filled: dict[str, Any] | None = None) -> None:
-    """Says something: it reaches every member of the cast within earshot, and the agent's history."""
+def speak(
+    world: World,
+    speaker: Entity,
+    text: str,
+    filled: dict[str, Any] | None = None,
+    to: Entity | None = None,
+) -> None:
+    """Says something, perhaps to somebody: it reaches the members within earshot, and the agent's history."""
     if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
@@ -102,11 +108,13 @@ def speak(world: World, speaker: Entity, text: str, filled: dict[str, Any] | Non
         # "Hidden NPCs: nothing they say reaches the agent, except a member with `audible: always`."
         if hearer is world.agent and world.npcs_hidden and speaker.key not in world.always_audible:
             continue
-        hearer.inbox.append(Heard(speaker, text, filled or {}))
+        if to not in (None, hearer) and not world.overheard:
+            continue
+        hearer.inbox.append(Heard(speaker, text, filled or {}, to))
         if hearer is world.agent:
-            world.lines.append((speaker, toned(world, speaker, text)))
+            world.lines.append(replace(hearer.inbox[-1], text=toned(world, speaker, text)))
     if speaker is world.agent and world.own_voice:
-        world.lines.append((speaker, text))
+        world.lines.append(Heard(speaker, text, filled or {}, to))
 
 
 def toned(world: World, speaker: Entity, text: str) -> str:

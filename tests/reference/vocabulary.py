@@ -61,6 +61,9 @@ class Vocabulary(Words):
                         yield from piece
         for name in self.members:
             yield from self.tones(name)
+        frames = self.scenario.frames.values()
+        if any(rule.to is not None for frame in frames for rule in self.entries_of(frame)):
+            yield "to"
 
     # -- what can be said ----------------------------------------------------------------------------------
 
@@ -108,14 +111,20 @@ class Vocabulary(Words):
         frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None:
             return []
-        rules: list[Any] = [entry.step for entry in frame.entries]
-        for state in (frame.states or {}).values():
-            rules += [*state.first, *state.then]
+        rules = self.entries_of(frame)
         return [
             self.sources.text(f"vocabulary.{frame_name}", rule.say, frame_name)
             for rule in rules
             if rule.say is not None
         ]
+
+    @staticmethod
+    def entries_of(frame: Frame) -> list[Any]:
+        """Its rules and entries, in order."""
+        rules: list[Any] = [entry.step for entry in frame.entries]
+        for state in (frame.states or {}).values():
+            rules += [*state.first, *state.then]
+        return rules
 
     def pieces(self, tree: Any, member: Who) -> list[list[str]]:
         """A text as a row of pieces, each a list of what it can read."""

@@ -117,6 +117,7 @@ class Heard:
     speaker: Entity
     text: str
     filled: dict[str, Any]  # what stands in its slots, where that was chosen
+    to: Entity | None = None  # who is addressed
 
 
 @dataclass(eq=False)
@@ -245,6 +246,7 @@ class World:
     always_audible: frozenset[str] = frozenset()
     npcs_hidden: bool = False
     own_voice: bool = False
+    overheard: bool = True  # whether others hear what is said to somebody
     egocentric: bool = False
     occlusion: bool = False
     gestures: bool = False  # whether the picture shows them
@@ -254,7 +256,7 @@ class World:
     shown_looks: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words of those that it shows
     canvas: tuple[int, int] = (0, 0)
     bonus: int = 0  # per cent that rules pay in this step
-    lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step
+    lines: list[Heard] = field(default_factory=list)  # what the agent heard in this step
 
     @property
     def agent(self) -> Entity:

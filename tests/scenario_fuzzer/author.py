@@ -95,6 +95,11 @@ class _Author:
         memory = self.memory(lets)
         made |= {"memory": memory} if memory else {}
         played = {frame.name: self.frame(frame, behaviour) for frame in frames}
+        if self.often(0.2):
+            made["overheard"] = False
+        if not ("to" in made["grammar"] or any("to" in entry for entry in mappings(played))):
+            for entry in mappings(played):
+                entry.pop("addressed", None)
         say_somewhere([played[frame.name] for frame in frames if not frame.of_agent], SAYINGS)
         made |= {"frames": played} if played else {}
         made["cast"] = self.cast()
@@ -166,7 +171,8 @@ class _Author:
             if known.follows
             else []
         )
-        return {"templates": list(known.templates), "slots": {slot: written[slot] for slot in known.slots}}
+        made = {"templates": list(known.templates), "slots": {slot: written[slot] for slot in known.slots}}
+        return made | ({"to": "<whom>"} if "whom" in known.slots and self.often(0.5) else {})
 
     def room(self) -> dict[str, Any]:
         """Its size, what is built, whether things cast shadows."""
@@ -665,3 +671,10 @@ def say_somewhere(frames: list[dict[str, Any]], texts: tuple[str, ...]) -> None:
         else:
             state = [*frame["states"].values()][number % len(frame["states"])]
             state.setdefault("then", []).append({"chance": 0.25, "say": text})
+
+
+def mappings(part: Any) -> list[dict[str, Any]]:
+    """All mappings in something that is written."""
+    inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    found = [one for each in inner for one in mappings(each)]
+    return [part, *found] if isinstance(part, dict) else found

@@ -97,6 +97,8 @@ class Behaviour:
         made: dict[str, Any] = {}
         if self.often(0.45):
             made["hears"], where = self.hearing(where)
+            if self.often(0.2):
+                made["addressed"] = self.often(0.6)
         if self.often(0.6) or not made:
             made["when"] = self.phrases.condition(where)
         if self.often(0.2):
@@ -143,6 +145,8 @@ class Behaviour:
             made["cause"] = [self.effect(where) for _ in range(self.rng.randint(1, 3))]
         if where.frame is not None and self.often(probability):
             made["say"] = self.phrases.words(where)
+            if where.is_npcs and self.often(0.2):
+                made["to"] = self.phrases.member(where)
         return made
 
     def registers(self, where: Where) -> dict[str, Callable[[], str]]:
