@@ -199,7 +199,7 @@ def test_numbers_are_at_least_one(gate: Path, option: str, capsys: Capture) -> N
 
 def test_the_example_of_the_page_holds(tmp_path: Path, capsys: Capture) -> None:
     page = (ROOT / "docs" / "checks.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    example, *_ = re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     grammar = "grammar: {templates: [Where is <noun>, Open <noun>], nouns: [the exit, sesame]}"
     head = f"scenario: page\nroom: {{size: 6}}\n{grammar}\n"
     file = tmp_path / "page.yaml"
