@@ -154,7 +154,7 @@ SPOKEN_OF = (
         ".empty_handed",
         "accepts:",
     ),
-    *("looks:", "words:", "tone:", ".size ==", ".mood !=", "set: {mood", ".pattern in", "random"),
+    *("looks:", "words:", "tone:", ".size ==", ".mood !=", ".mood:", ".pattern ==", "random"),
     *(".move_into(", ".put(", ".reset", ".vanish", ".become(", ".reveal", "push(", "use(", "enter(", "flee("),
     *("slots:", "define:", "require:", "order:", "occlusion: true", "npcs: hidden", "image: before_npcs"),
     *("pointing", "egocentric", "own_voice: true", "reward:", "each_step:", "would_see(", "joint_attention("),

@@ -183,6 +183,8 @@ class Vocabulary(Words):
                 return self.names_of_subject(tree.subject, member)
             if tree.name in self.scenario.looks:
                 return list(self.scenario.looks[tree.name].words)
+            if tree.name in self.scenario.grammar.slots:
+                return self.values(ast.Name(tree.name), member)
         if isinstance(tree, ast.Text):
             texts = [""]
             for piece in self.pieces(tree, member):
