@@ -40,9 +40,12 @@ def noting(fired: list[str]) -> Iterator[None]:
         return found
 
     def end_step(self: frames.FrameRunner, frame: Any, turn: Any) -> None:
-        before = self.me.state
+        before, rounds = self.me.state, dict(self.me.rounds)
         plain[1](self, frame, turn)
-        if self.me.state != before:
+        if (self.me.state, self.me.rounds) != (
+            before,
+            rounds,
+        ):  # a step that is repeated alone changes the rounds
             fired.append(f"{self.me.key} steps {before}")
 
     def apply(rule: Any, path: str, *rest: Any) -> None:
