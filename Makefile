@@ -12,6 +12,9 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
+# The tests start hundreds of processes, each of which would compile all of our modules.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference update-goldens clean
 
 help: ## list the targets

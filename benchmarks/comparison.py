@@ -48,7 +48,7 @@ def measure_limit(
         allowed = Allowed(_SCENARIO) if mix == "walk" else None
         for batch in batches:
             envs = limit.make(batch)
-            actions = list(walk_actions(envs, allowed, 1) if allowed else random_actions(envs, 1))
+            actions = list(walk_actions(envs.num_envs, allowed, 1) if allowed else random_actions(envs, 1))
             envs.reset(seed=1)
             speed = speed_of(_playing(envs, actions), batch, repetitions, seconds)
             report.rows.append(Row(f"limit: {limit.what}", "limit", mix, batch, speed, None))

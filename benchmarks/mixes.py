@@ -26,11 +26,11 @@ def random_actions(envs: Any, seed: int) -> Actions:
     return generator.integers(0, sizes, (BATCHES, envs.num_envs, len(sizes)))
 
 
-def walk_actions(envs: Any, allowed: "Allowed", seed: int) -> Actions:
-    """Walking and harmless talk, int64 (BATCHES, E, 3 + slots)."""
-    shape = (BATCHES, envs.num_envs)
+def walk_actions(count: int, allowed: "Allowed", seed: int) -> Actions:
+    """Walking and harmless talk in the scenario's own action space, int64 (BATCHES, count, 3 + slots)."""
+    shape = (BATCHES, count)
     generator = np.random.default_rng(seed)
-    actions = np.zeros((*shape, len(envs.single_action_space.nvec)), np.int64)
+    actions = np.zeros((*shape, 2 + allowed.utterances.shape[1]), np.int64)
     actions[..., 0] = generator.choice(allowed.primitives, shape)
     if len(allowed.utterances):
         actions[..., 1] = generator.integers(0, 2, shape)
@@ -43,7 +43,7 @@ class Allowed:
 
     Attributes:
         primitives: int64 (P',), indices of left, right, forward and none, without those that end most episodes
-            in the step in which they are done.
+            in the step in which they are done; none alone if all do.
         utterances: int64 (U, 1 + slots), templates and words that never ended an episode when said standing still.
     """
 
@@ -69,7 +69,8 @@ class Allowed:
             used += np.bincount(actions[:, 0], minlength=count)
             ended += np.bincount(actions[:, 0], terminations, minlength=count)
         # Below one half, because an action given in the step that starts the next episode is not carried out.
-        return walking[ended[walking] < 0.3 * used[walking]]
+        harmless = walking[ended[walking] < 0.3 * used[walking]]
+        return harmless if len(harmless) else walking[-1:]
 
     def _probe_utterances(self, envs: Any, sizes: list[int], generator: np.random.Generator) -> Actions:
         spoken = sizes[2:]

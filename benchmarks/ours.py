@@ -100,7 +100,9 @@ class Ours:
         return self._allowed[name]
 
     def _actions(self, name: str, mix: str, envs: Any) -> Actions:
-        return walk_actions(envs, self._allowed_in(name), 1) if mix == "walk" else random_actions(envs, 1)
+        if mix == "walk":
+            return walk_actions(envs.num_envs, self._allowed_in(name), 1)
+        return random_actions(envs, 1)
 
     def _vector(self, what: str, mix: str, envs: Any, actions: Actions, seconds: float | None = None) -> Row:
         envs.reset(seed=1)
@@ -120,7 +122,7 @@ class Ours:
         if mix == "walk":
             for name in dict.fromkeys(played):
                 rows = [i for i, other in enumerate(played) if other == name]
-                own = walk_actions(envs, self._allowed_in(name), 1)[:, rows]
+                own = walk_actions(envs.num_envs, self._allowed_in(name), 1)[:, rows]
                 actions[:, rows] = translated(own, name, envs.program)
         return self._vector(what, mix, envs, actions, seconds)
 

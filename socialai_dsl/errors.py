@@ -1,7 +1,4 @@
-"""What ends a request that was understood: the caller's mistake, or a run that stopped by itself.
-
-The words of pydantic's errors, too.
-"""
+"""What ends a request that was understood: the caller's mistake, or a run that stopped by itself."""
 
 from collections.abc import Mapping, Sequence
 from reprlib import repr

@@ -141,6 +141,7 @@ def test_videos(name: str, tmp_path: Path) -> None:
     assert video.stat().st_size > 1000
 
 
+@pytest.mark.thorough("starts processes")
 @pytest.mark.parametrize(
     "code",
     [

@@ -98,6 +98,21 @@ def test_the_noun_of_a_silent_agent_is_not_said(tmp_path: Path) -> None:
     assert (registers(spoken), spoken["heard"]) == ({"other": 1, "rest": 0}, ["Ann: Was it bye"])
 
 
+@pytest.mark.parametrize("comparison", ["last != price(t)", "price(t) != last", "not prev(last) == last"])
+def test_a_comparison_with_an_empty_register_looks_for_the_other_side(
+    tmp_path: Path, comparison: str
+) -> None:
+    text = f"""
+    state: {{last: {{start: none, range: 0..3}}, price: {{for: 1..2, start: none, range: 0..3}}, times: 0}}
+    rules:
+      - {{when: {comparison}, set: {{times: "min(times + 1, 9)"}}}}
+      - {{when: t == 9, set: {{last: 1, price(2): 1}}}}
+    """
+    # `prev` of nothing is nothing; of the keys 1 to 4 two have a price.
+    found = 0 if "prev" in comparison else 2
+    assert play(tmp_path, text, [STILL] * 4)["state"]["times"] == found
+
+
 def test_a_box_is_toggled_by_who_opened_it_though_its_content_stands_there(tmp_path: Path) -> None:
     state = play(
         tmp_path,
@@ -510,3 +525,63 @@ def test_an_empty_register_cannot_be_said(tmp_path: Path, value: str) -> None:
     assert run.info["utterance"] == "Ann: Nothing."
     run.step(said="Say hello")
     assert run.step().info["utterance"] == "Ann: It was hello."
+
+
+@pytest.mark.parametrize(("when", "facing"), [("is(early)", "down"), ("is(late)", "up")])
+def test_entries_after_nested_ones_that_are_left_out_are_asked_as_themselves(
+    tmp_path: Path, when: str, facing: str
+) -> None:
+    text = f"""
+    frames:
+      walk:
+        steps:
+          - {{when: false, steps: [{{do: left, state: early}}]}}
+          - {{repeat: 2, when: is(inner), steps: [{{when: is(inner), do: left, state: inner}}, {{do: right}}]}}
+          - {{when: {when}, do: right, for: 2, state: late}}
+          - {{do: left}}
+    cast: {{ann: {{at: [5, 5], facing: left, frame: walk}}}}
+    """
+    state = play(tmp_path, text, [STILL] * 5)
+    assert (state["ann"]["facing"], state["ann"]["state"]) == (
+        facing,
+        "late" if facing == "up" else "finished",
+    )
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        "{steps: [{do: perform(dance), set: {mood: angry}}]}",
+        "{states: {s: {first: [{say: Say bye}], then: [{set: {mood: angry}}]}}}",
+    ],
+)
+def test_what_changes_after_a_line_was_said_does_not_change_its_tone(tmp_path: Path, frame: str) -> None:
+    text = f"""
+    looks: {{mood: {{for: ann, words: [calm, angry], start: calm}}}}
+    let: {{dance: {{sequence: 1, moves: [left], utterance: {{chance: 1}}}}}}
+    frames: {{talk: {frame}}}
+    cast: {{ann: {{at: [5, 5], frame: talk}}}}
+    observe: {{tone: mood}}
+    """
+    state = play(tmp_path, text, [STILL])
+    assert state["heard"][0].startswith("Ann: (calm) Say ")
+    assert state["ann"]["looks"] == {"mood": "angry"}
+
+
+def test_a_rule_may_set_many_registers_to_computed_values(tmp_path: Path) -> None:
+    text = """
+    state: {a: {for: 1..90, start: 0, range: 0..9}}
+    rules: [{set: {a(1..90): t % 7 + abs(t - 3)}}]
+    """
+    assert play(tmp_path, text, [STILL])["state"]["a"] == {str(key): 3 for key in range(1, 91)}
+
+
+def test_a_place_may_have_many_parts_and_a_search_others_within(tmp_path: Path) -> None:
+    nearest = "agent"
+    for name in "abcdefghi":
+        nearest = f"nearest({name} in cells to {nearest})"
+    text = f"""
+    let: {{there: {nearest}}}
+    objects: {{coin: {{type: ball, place: {" | ".join(f"row({y})" for y in (1, 2, 3, 4, 5) * 2)}}}}}
+    """
+    assert play(tmp_path, text, [STILL])["let"]["there"] == [1, 1]

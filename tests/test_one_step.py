@@ -922,6 +922,13 @@ def test_5_18_points_until_it_stops(play: Folder) -> None:
     seen = [run.step().state["ann"].get("pointing") for _ in range(4)]
     assert seen == ["right", "right", "right", None]
     assert (run.facing("ann"), run.at("ann")) == ("right", [4, 5])
+    run = play("""
+        objects: {ball: {type: ball, at: [5, 1]}}
+        frames: {show: {steps: [{do: point_at(ball), cause: ball.vanish}, {do: forward}, {do: stop_pointing}]}}
+        cast: {ann: {at: [3, 4], facing: down, frame: show}}
+    """)
+    seen = [run.step().state["ann"].get("pointing") for _ in range(3)]
+    assert seen == [[5, 1], [5, 1], None]
 
 
 def test_5_19_the_world_is_settled_after_the_body_action(play: Folder) -> None:
@@ -1624,6 +1631,17 @@ def test_5_66_what_is_next_is_the_state_even_if_it_is_left_out(play: Folder) -> 
     run = play(LEFT_OUT.format(when="false")).step()
     assert run.status("ann") == "waiting"
     assert run.step().status("ann") == "finished"
+    text = """
+        frames:
+          walk:
+            steps:
+              - {do: left, until: t == 2}
+              - {when: false, do: left}
+              - {when: is(third) and turns_in_state == 0, do: right, for: 2, state: third}
+              - {do: left, say: Done.}
+        cast: {ann: {at: [5, 5], facing: right, frame: walk}}
+    """
+    assert play(text).steps(3).facing("ann") == "up", "it was in its third entry when that was asked"
 
 
 def test_5_67_a_rule_that_uses_slots_notices_what_has_all_of_them(play: Folder) -> None:
@@ -2451,3 +2469,16 @@ def test_12_9_the_tone_is_no_part_of_what_is_said(play: Folder) -> None:
         outcome: [{failure: ann.said("Say hello") and bob.known == 1}]
     """).step()
     assert (run.info["utterance"], run.terminated) == ("Ann: (angry) Say hello", True)
+
+
+def test_12_10_perform_speaks_before_anything_is_set(play: Folder) -> None:
+    text = """
+        looks: {mood: {for: ann, words: [calm, angry], start: calm}}
+        let: {dance: {sequence: 1, moves: [left], utterance: {chance: 0.5}}}
+        frames: {dance: {steps: [{do: perform(dance), set: {mood: angry}}, {say: So}]}}
+        cast: {ann: {at: [1, 5], frame: dance}}
+        observe: {tone: mood}
+    """
+    run = play(text, {"let": {"dance": [["left", "Say hello"]]}})
+    heard = [run.step().info["utterance"] for _ in range(2)]
+    assert heard == ["Ann: (calm) Say hello", "Ann: (angry) So"]

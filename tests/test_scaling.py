@@ -31,7 +31,7 @@ EFFORT = ("misspelt names among many", "places in rooms of many sizes")
 @pytest.mark.parametrize(
     "name",
     one_in(
-        5,
+        15,
         [name for name in SCENARIOS if name not in EFFORT],
         "counts the calls while it checks large files",
     ),

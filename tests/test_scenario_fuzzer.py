@@ -115,6 +115,12 @@ def test_a_seed_makes_one_scenario() -> None:
     assert write(7) != write(8)
 
 
+def test_where_only_the_agent_follows_a_frame_it_waits_for_no_npc(tmp_path: Path) -> None:
+    path = tmp_path / "random_680.yaml"
+    path.write_text(write(680), encoding="utf-8")
+    assert {frame.member for frame in load(str(path)).checked.frames if frame.written} == {"agent"}
+
+
 SPOKEN_OF = (
     *("hears: any", "<noun>", "speaker", "heard(", "agent.said(", "agent.noun", ".spoke"),
     *("goto_now:", "once: true", "chance:", "after:", "until:", "perform(", "memory:", "tables:", "state:"),
@@ -157,7 +163,17 @@ SPOKEN_OF = (
     *("looks:", "words:", "tone:", ".size ==", ".mood !=", ".mood:", ".pattern ==", "random"),
     *(".move_into(", ".put(", ".reset", ".vanish", ".become(", ".reveal", "push(", "use(", "enter(", "flee("),
     *("slots:", "define:", "require:", "order:", "occlusion: true", "npcs: hidden", "image: before_npcs"),
-    *("pointing", "egocentric", "own_voice: true", "reward:", "each_step:", "would_see(", "joint_attention("),
+    *(
+        "pointing",
+        "point_at(",
+        "pointing_right",
+        "egocentric",
+        "own_voice: true",
+        "reward:",
+        "each_step:",
+        "would_see(",
+        "joint_attention(",
+    ),
     *(" if ", " else ", "repeat:", "while:"),
 )
 """What authors can write, and what the random scenarios of the ordinary suite are to contain."""

@@ -41,6 +41,7 @@ def content(path: Path) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.thorough("trains and evaluates")
 def test_a_run_becomes_a_small_agent_with_a_card(agents: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert {path.name for path in agents.iterdir()} == {"help", INDEX}, "nothing temporary stays"
     result = content(agents / "help" / "result.json")

@@ -42,9 +42,10 @@ def joint_entropy(logits: Tensor, entropies: Tensor, sizes: tuple[int, ...], use
     """Entropy of the whole action in nats, (N,): H(body) + H(speak) + p(speak) (H(template) + sum of p(has s) H(s)).
 
     The heads are independent, and what a template lacks, and in silence all that would have been said, is no choice.
-    Logits are (N, A), entropies (N, H) of each head; p(has s) is the chance of a template that has the slot s.
+    Logits are (N, A), entropies (N, H) of each head; p(has s) is the chance of a template that has the slot s. Both
+    chances have no gradient: it pays for talking, and who talks all the time does not learn to heed (docs/learning.md).
     """
-    _, speak, template, *_ = torch.split(logits, list(sizes), -1)
+    _, speak, template, *_ = torch.split(logits.detach(), list(sizes), -1)
     chances = 1 if used is None else torch.softmax(template, -1) @ used.to(logits)  # (N, slots)
     said = torch.cat((entropies[:, TEMPLATE:SLOTS], chances * entropies[:, SLOTS:]), -1).sum(-1)  # (N,)
     return entropies[:, :TEMPLATE].sum(-1) + torch.softmax(speak, -1)[:, 1] * said

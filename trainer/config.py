@@ -112,7 +112,7 @@ class RunConfig(BaseModel):
         "joint: one ratio of the whole action; per_head: a ratio, clip, entropy and value term for each head, "
         "averaged over the four (paper)",
     )
-    bootstrap_timeouts: bool = _option(True, "go on with the value after a time-out (paper: terminal)")
+    bootstrap_timeouts: bool = _option(False, "go on with the value after a time-out (paper: terminal)")
     bonus_c: float = _option(
         7.0, "C of the bonus (default: the paper's for the scenario, else 7 for lang and 3 for cell)", ge=0
     )
@@ -240,7 +240,6 @@ _PAPER: Final[Mapping[str, Any]] = {
     "normalize_advantages": False,
     "update": "chunks",
     "loss": "per_head",
-    "bootstrap_timeouts": False,
 }
 
 NET_PRESETS: Final[Mapping[str, Preset]] = {
@@ -259,6 +258,7 @@ RECIPES: Final[Mapping[str, Preset]] = {
     "guided": Preset(
         {
             "guide": "script",
+            "bootstrap_timeouts": True,  # as measured; after imitation hardly an episode runs out of time
             "envs": 128,
             "horizon": 64,
             "minibatches": 16,

@@ -90,9 +90,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     progress = ProgressLine(sys.stderr)
     parts = [part for part in PARTS if part in (arguments.parts or ["claims"])]
     scenarios = [pair for name in arguments.scenarios for pair in scenarios_of(name)]
-    load(
-        serve
-    )  # before the time begins: where the engine is not compiled yet, that takes longer than most checks
+    # Before the time begins: where the engine is not compiled yet, that takes longer than most checks.
+    load(serve)
     clock = Clock(arguments.seconds * len(scenarios) or None, progress.show)
     documents: list[dict[str, Any]] = []
     ends = [Exit.GOOD]

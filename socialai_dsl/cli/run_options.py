@@ -11,8 +11,6 @@ from pydantic import ValidationError
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.errors import UsageError, first_mistake
-from socialai_dsl.evaluation.players import folder_of, named_agent, resolve_device
-from socialai_dsl.evaluation.scripts import scripted_name
 from socialai_dsl.experiments.settings import resolved_config
 from socialai_dsl.run_folder import read_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
@@ -93,6 +91,8 @@ def started(arguments: argparse.Namespace) -> RunConfig:
     """The configuration of a new run."""
     if arguments.scenario is None:
         raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
+    from socialai_dsl.evaluation.players import folder_of, named_agent
+
     arguments.agent = agent = named_agent(arguments.agent or "ppo", arguments.scenario)
     if agent not in BUILT_IN_AGENTS and not folder_of(agent).exists():
         known = ", ".join(BUILT_IN_AGENTS)
@@ -132,6 +132,8 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
     Raises:
         UsageError: an option is unknown or out of bounds, or options contradict each other.
     """
+    from socialai_dsl.evaluation.players import resolve_device
+
     given = {name: getattr(arguments, name) for name in FLAGS if getattr(arguments, name) is not None}
     hyper = _read_hyper(arguments.hyper)
     trains = given.get("agent", "ppo") == "ppo"
@@ -218,6 +220,8 @@ def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
         return "paper"
     if given.get("guide", "script") != "script" or given.get("curriculum", "none") != "none":
         return "plain"
+    from socialai_dsl.evaluation.scripts import scripted_name
+
     return "guided" if scripted_name(scenario) is not None else "plain"
 
 
@@ -226,10 +230,12 @@ GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 
 def frames_for(recipe: str, scenario: str) -> int:
-    """Frames where nobody says how many: measured to be enough for every scenario of the paper (docs/mastery.md)."""
+    """Frames where nobody says how many: what the scenario says, measured to be enough (docs/mastery.md)."""
     import socialai_dsl
 
     if recipe != "guided":
         return PLAIN_FRAMES
-    is_suite = isinstance(socialai_dsl.load(scenario), socialai_dsl.LoadedSuite)
-    return GUIDED_FRAMES_OF_A_SUITE if is_suite else GUIDED_FRAMES
+    loaded = socialai_dsl.load(scenario)
+    if isinstance(loaded, socialai_dsl.LoadedSuite):
+        return loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE
+    return loaded.scenario.training_frames or GUIDED_FRAMES

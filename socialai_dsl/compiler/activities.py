@@ -19,7 +19,8 @@ _BODIES = {
     "pickup": Body.PICKUP,
     "drop": Body.DROP,
 }
-GOING = ("go_to", "go_next_to", "enter", "search")
+_TO_A_PLACE = ("go_to", "go_next_to", "enter")
+GOING = (*_TO_A_PLACE, "search")
 """Activities that take no step when they are fulfilled before they begin."""
 
 
@@ -43,9 +44,7 @@ def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
     if activity.name in ACTS:
         return True
-    return activity.name in ("go_to", "go_next_to", "enter", "turn_to") and not isinstance(
-        activity.args[0], Const
-    )
+    return activity.name in (*_TO_A_PLACE, "turn_to") and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -146,10 +145,10 @@ class Activities:
             case "push":
                 self._push(activity)
             case "point":
-                way = activity.args[0]
-                if isinstance(way, Measure):
-                    self._present(way.args[1])
-                block.emit(Op.POINT, own, to.value(way))
+                where = activity.args[0]
+                if isinstance(where, Measure):
+                    self._present(where.args[1])
+                block.emit(Op.POINT, own, self._present(where))
             case "stop_pointing":
                 block.emit(Op.BODY, constant(Body.STOP_POINTING))
             case "stay_near":

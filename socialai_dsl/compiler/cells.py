@@ -10,10 +10,20 @@ from typing import Final
 
 from socialai_dsl.compiler.assembler import LARGEST, NOWHERE, Block, Label, Registers, Sites, constant
 from socialai_dsl.compiler.folding import TRUE, Classes, Facts, fold, leaving, mentions, substitute
-from socialai_dsl.program import BOARDS, CELL, Counting, Field, Op, Register
+from socialai_dsl.program import CELL, Counting, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.semantics.terms import Const, Read, Select, Term, may_find_nothing
+from socialai_dsl.semantics.terms import (
+    Const,
+    Read,
+    Select,
+    Term,
+    Type,
+    draws,
+    is_own_noun,
+    may_be_nothing,
+    may_find_nothing,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +236,6 @@ def coordinate(to: Emitter, term: terms.FieldOf) -> int:
 EVERYWHERE: Final = (constant(0), constant(31), constant(0), constant(31))
 """Operands of the least and the greatest x, then of y, of a rectangle that is all there is."""
 
-_MOST_BOARDS: Final = 2
 _LEAST, _GREATEST = 0, 1
 _COLUMNS, _ROWS = 0, 2
 
@@ -283,7 +292,7 @@ def _is_shape(to: Emitter, where: Term, variable: str) -> bool:
         case _:
             return False
     known = not (_is_mentioned(other, variable) or (to.failed is not None and may_find_nothing(other)))
-    return about_it and known and to.block.boards_taken + _MOST_BOARDS <= BOARDS
+    return about_it and known
 
 
 def _shape(to: Emitter, where: Term, variable: str) -> int:
@@ -541,19 +550,20 @@ def _far(to: Emitter) -> int:
     return to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
 
 
-# -- values: cheap where all conditions ask which number one register holds ----------------------------------
+# -- values: cheap where all conditions ask which number one value is -----------------------------------------
 
 
 _MASK_BITS = LARGEST.bit_length()
 """How many numbers a set in one operand can tell apart."""
 _WORD_BITS = 63
+_MOST_NUMBERS = 1 << 12
 
 
 @dataclass(frozen=True)
 class _Switch:
-    """A Select that only depends on one register: for each value the numbers for which it is taken; all are covered."""
+    """A Select that only depends on one key: for each value the numbers for which it is taken; all are covered."""
 
-    read: Read
+    key: Term
     cases: dict[Term, set[int]]
 
 
@@ -563,8 +573,8 @@ def selected_value(to: Emitter, term: Select) -> int:
     if switch is not None:
         shift = _shift(switch)
         if shift is not None:
-            register = to.value(switch.read)
-            return to.into_temporary(Op.ADD, register, constant(shift)) if shift else register
+            key = to.value(switch.key)
+            return to.into_temporary(Op.ADD, key, constant(shift)) if shift else key
     result = to.block.temporary()
 
     def take(value: Term) -> None:
@@ -590,17 +600,17 @@ def selected_condition(to: Emitter, term: Select, otherwise: Label) -> None:
     true = set[int]().union(
         *(numbers for value, numbers in switch.cases.items() if isinstance(value, Const) and value.value)
     )
-    among(to, switch.read, true, otherwise)
+    among(to, to.value(switch.key), switch.key.type, true, otherwise)
 
 
 def _overwrite(to: Emitter, switch: _Switch, take: Callable[[Term], None]) -> None:
     """The commonest value, then each other one in its cases."""
-    commonest = _commonest(switch)
+    commonest, key = _commonest(switch), to.value(switch.key)
     take(commonest)
     for value, numbers in switch.cases.items():
         if value != commonest:
             following = Label()
-            among(to, switch.read, numbers, following)
+            among(to, key, switch.key.type, numbers, following)
             take(value)
             to.block.bind(following)
 
@@ -619,11 +629,11 @@ def _branches(to: Emitter, term: Select, switch: _Switch | None, take: Callable[
         for condition, value in zip(term.conditions, term.values, strict=True):
             branches.append((lambda to_next, asked=condition: to.condition(asked, to_next), value))  # type: ignore[misc]
     else:
-        last = _commonest(switch)
+        last, key = _commonest(switch), to.value(switch.key)
         for value, numbers in switch.cases.items():
             if value != last:
                 branches.append(
-                    (lambda to_next, taken=numbers: among(to, switch.read, taken, to_next), value)  # type: ignore[misc]
+                    (lambda to_next, taken=numbers: among(to, key, switch.key.type, taken, to_next), value)  # type: ignore[misc]
                 )
     for ask, value in branches:
         following = Label()
@@ -640,33 +650,42 @@ def _switch(term: Select) -> _Switch | None:
     first = asked[0] if asked else None
     if first is None:
         return None
-    read = first[0]
-    left = set(read.type.values)
+    key = first[0]
+    left = set(key.type.values)
     cases: dict[Term, set[int]] = {}
     for ask, value in zip(asked, term.values, strict=True):
-        if ask is None or ask[0] != read:
+        if ask is None or ask[0] != key:
             return None
         if taken := ask[1] & left:
             cases.setdefault(value, set()).update(taken)
             left -= taken
     if left:
         cases.setdefault(term.default, set()).update(left)
-    return _Switch(read, cases)
+    return _Switch(key, cases)
 
 
-def asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
-    """The register that a condition is about, and the numbers for which it holds."""
+def asks(condition: Term) -> tuple[Term, frozenset[int]] | None:
+    """The key that a condition is about, a value that is computed once, and the numbers for which it holds."""
     match condition:
-        case terms.Compare(op="==", left=Read(nothing=None) as read, right=Const(value=number)):
-            return read, frozenset((number,))
-        case terms.Compare(op="==", left=Const(value=number), right=Read(nothing=None) as read):
-            return read, frozenset((number,))
+        case terms.Compare(op="==", left=key, right=Const(value=number)) if _is_key(key):
+            return key, frozenset((number,))
+        case terms.Compare(op="==", left=Const(value=number), right=key) if _is_key(key):
+            return key, frozenset((number,))
         case terms.Logic(op="or", args=args):
             parts = [asks(arg) for arg in args]
             known = [part for part in parts if part is not None]
-            if len(known) == len(parts) and len({read for read, _ in known}) == 1:
+            if len(known) == len(parts) and len({key for key, _ in known}) == 1:
                 return known[0][0], frozenset[int]().union(*(numbers for _, numbers in known))
     return None
+
+
+def _is_key(term: Term) -> bool:
+    """Whether a term has the same value wherever it stands in an expression, one of not too many, and never nothing."""
+    if isinstance(term, Read):
+        return term.nothing is None
+    if isinstance(term, Const) or term.type.high - term.type.low > _MOST_NUMBERS:
+        return False
+    return not (draws(term) or is_own_noun(term) or may_be_nothing(term))
 
 
 def _shift(switch: _Switch) -> int | None:
@@ -679,18 +698,18 @@ def _shift(switch: _Switch) -> int | None:
     return shifts.pop() if len(shifts) == 1 else None
 
 
-def among(to: Emitter, read: Read, numbers: Set[int], otherwise: Label) -> None:
-    """Fall through if the register holds one of these numbers."""
-    block, register, low, high = to.block, to.value(read), read.type.low, read.type.high
+def among(to: Emitter, key: int, type_: Type, numbers: Set[int], otherwise: Label) -> None:
+    """Fall through if an operand of this type is one of these numbers."""
+    block, low, high = to.block, type_.low, type_.high
     numbers = numbers & set(range(low, high + 1))
     others = set(range(low, high + 1)) - numbers
     if not numbers:
         block.skip(otherwise)
     elif len(numbers) == 1:
-        block.test(Op.IF_EQ, register, constant(min(numbers)), otherwise)
+        block.test(Op.IF_EQ, key, constant(min(numbers)), otherwise)
     elif len(others) == 1:
-        block.test(Op.IF_NE, register, constant(min(others)), otherwise)
+        block.test(Op.IF_NE, key, constant(min(others)), otherwise)
     elif others and low >= 0 and high < _WORD_BITS and max(numbers) < _MASK_BITS:
-        block.test(Op.IF_BIT, constant(sum(1 << number for number in numbers)), register, otherwise)
+        block.test(Op.IF_BIT, constant(sum(1 << number for number in numbers)), key, otherwise)
     elif others:
-        to.one_of(Op.IF_EQ, register, frozenset(numbers), otherwise)
+        to.one_of(Op.IF_EQ, key, frozenset(numbers), otherwise)

@@ -1,8 +1,8 @@
-"""Effects to code, and what follows: what is remembered, put off and put back, links, computed statuses and timers."""
+"""Effects to code, and what follows: what is remembered, put off and put back, links and timers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
@@ -20,7 +20,7 @@ from socialai_dsl.compiler.assembler import (
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
-from socialai_dsl.compiler.folding import Changes, Mobility, When, plans
+from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole, plans
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, Chosen, sizes
@@ -29,7 +29,6 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
     Assignment,
     CheckedScenario,
-    Computed,
     Drawn,
     Effect,
     Entity,
@@ -191,10 +190,10 @@ def _chooses(what: RulePlan | StepPlan) -> bool:
 
 
 class Effects:
-    """Emits effects through `to`."""
+    """Emits effects through `to`; after one on a register that computed statuses `read` these are settled again."""
 
-    def __init__(self, to: Expressions, lines: Lines, homes: Homes) -> None:
-        self.to, self.lines, self.homes = to, lines, homes
+    def __init__(self, to: Expressions, lines: Lines, homes: Homes, read: Set[str]) -> None:
+        self.to, self.lines, self.homes, self.read = to, lines, homes, read
         self.checked, self.registers = to.checked, to.registers
 
     def emit(
@@ -210,19 +209,19 @@ class Effects:
         to = self.to
         chosen = Chosen(to, what) if _chooses(what) else None
         to.failed = failed
-        sets = tuple(
-            to.sited_copy(item.value) if chosen is None else chosen.set_to(item) for item in what.sets
-        )
+        set_to = chosen.set_to if chosen else lambda item: to.sited_copy(item.value)
+        sets = tuple(map(set_to, what.sets))
         keys = tuple(self._key(item, what) for item in what.sets)
         targets: list[tuple[int, ...]] = []
         values: list[int | None] = []
         for effect in what.causes:
             to.site = effect.site
-            targets.append(tuple(self._steady(to.value(entity), what) for entity in effect.entities))
+            targets.append(tuple(self._steady(to.value_alone(entity), what) for entity in effect.entities))
             if effect.each and chosen is not None:
                 values.append(chosen.value_of(effect))
             else:
-                values.append(None if effect.value is None else self._steady(to.value(effect.value), what))
+                value = effect.value
+                values.append(None if value is None else self._steady(to.value_alone(value), what))
         line = None
         if what.say is not None:
             assert speaker is not None, "internal: nobody is there to say it"
@@ -236,8 +235,8 @@ class Effects:
         if item.target is None:
             return None
         self.to.site = item.key_site
-        first, place = row(self.to, item.target)
-        return first, self._steady(place, what)
+        mark, (first, place) = self.to.block.taken, row(self.to, item.target)
+        return first, self._steady(self.to.alone(mark, place), what)
 
     def carry_out(self, what: RulePlan | StepPlan, operands: Operands, speaker: Entity | None) -> None:
         """Set, reward, cause, say."""
@@ -246,6 +245,8 @@ class Effects:
         for item, operand, key in zip(what.sets, operands.sets, operands.keys, strict=True):
             with only(item.only):
                 store(self.registers, block.emit, item.paths[0], operand, _empties(item), key)
+        if any(path in self.read for item in what.sets for path in item.paths):
+            block.emit(Op.LOAD, Register.CHANGED, constant(1))
         if isinstance(what, RulePlan) and what.reward:
             block.emit(Op.REWARD, constant(what.reward))
         for effect, targets, value in zip(what.causes, operands.targets, operands.values, strict=True):
@@ -387,7 +388,9 @@ def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
 
 
 def _note_whether(to: Expressions, path: str, condition: Sited) -> None:
-    """Let a register tell whether a condition holds."""
+    """Let a register tell whether a condition holds; it is 0 from the reset on."""
+    if fold_whole(condition.term, to.facts, to.classes) == FALSE:
+        return
     register, not_so = to.registers.by_path[path], Label()
     to.block.span = condition.span
     to.block.emit(Op.LOAD, register, constant(0))
@@ -689,51 +692,6 @@ def _state(thing: Entity, name: str) -> int:
 def _type(thing: Entity) -> ObjectType:
     assert thing.type is not None, "internal: only objects are linked"
     return thing.type
-
-
-# -- statuses that follow from conditions ----------------------------------------------------------------------
-
-
-class ComputedStatuses:
-    """The computed statuses of a scenario: those that a reset decides for good, and those that are settled."""
-
-    def __init__(self, checked: CheckedScenario) -> None:
-        changes = Changes(checked)
-        whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
-        for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
-        self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
-        self.settled = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if not fixed)
-        self.settle_always = any(when == When.ANY_TIME for _, when in whens)
-
-    def fix(self, to: Expressions) -> None:
-        """Emit those that never change, each unless a layout gives the status."""
-        for item in self.fixed:
-            pinned = Label()
-            to.block.span = item.condition.span
-            to.block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0, pinned)
-            _settle(to, item)
-            to.block.bind(pinned)
-
-    def settle(self, to: Expressions) -> None:
-        """Emit those that can change, each after those it reads."""
-        for item in self.settled:
-            _settle(to, item)
-
-
-def _settle(to: Expressions, item: Computed) -> None:
-    """On while the condition holds; off where it was on and the condition does not hold; else left alone."""
-    block = to.block
-    status = entity_register(item.entity, Field.STATUS)
-    entity, on, off = (constant(number) for number in (item.entity, item.on, item.off))
-    false, done = Label(), Label()
-    to.sited_condition(item.condition, false)
-    block.test(Op.IF_NE, status, on, done)
-    block.emit(Op.BECOME, entity, on)
-    block.skip(done)
-    block.bind(false)
-    block.test(Op.IF_EQ, status, on, done)
-    block.emit(Op.BECOME, entity, off)
-    block.bind(done)
 
 
 # -- timers ----------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
+from typing import Final
 
 from socialai_dsl.compiler.assembler import (
     Label,
@@ -85,6 +86,10 @@ _COMPARE = {"==": Op.IF_EQ, "!=": Op.IF_NE, "<": Op.IF_LT, "<=": Op.IF_LE}
 _OPPOSITE = {"==": "!=", "!=": "=="}
 
 
+_FEW: Final = 64
+"""Rules that take no more temporaries need no code that gives some back."""
+
+
 def chance_word(probability: float) -> int:
     """A probability as an operand."""
     return round(probability * 65536)
@@ -115,7 +120,8 @@ class Expressions(Emitter):
             case terms.Logic():
                 asked = asks(term)
                 if asked is not None:
-                    among(self, *asked, otherwise)
+                    key, numbers = asked
+                    among(self, self.value(key), key.type, numbers, otherwise)
                 else:
                     self._either(term.args, otherwise)
             case terms.Not():
@@ -360,8 +366,26 @@ class Expressions(Emitter):
 
     def sited_copy(self, sited: terms.Sited) -> int:
         """The same in a temporary that nothing else changes or reads."""
-        value = self.sited_value(sited)
-        return value if TEMPORARY <= value < CONSTANT // 2 else self.into_temporary(Op.LOAD, value)
+        mark, value = self.block.taken, self.sited_value(sited)
+        if not TEMPORARY <= value < CONSTANT // 2:
+            value = self.into_temporary(Op.LOAD, value)
+        return self.alone(mark, value)
+
+    def alone(self, mark: int, value: int) -> int:
+        """A value for which only one temporary from `mark` on is taken, where more than a few are."""
+        if self.block.taken <= _FEW:
+            return value
+        self.block.release(mark)
+        if not TEMPORARY + mark <= value < CONSTANT // 2:
+            return value
+        first = self.block.temporary()
+        if value != first:
+            self.block.emit(Op.LOAD, first, value)
+        return first
+
+    def value_alone(self, term: Term) -> int:
+        """The value of a term, `alone`."""
+        return self.alone(self.block.taken, self.value(term))
 
     def _operation(self, term: terms.Operation) -> int:
         if term.op in ("abs", "neg"):

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import reduce
 from itertools import product
+from operator import add, mul, sub
 from typing import Any, TypeVar, assert_never
 
 from socialai_dsl.grammar.ast import children, every, rebuilt
@@ -136,26 +138,25 @@ class _Addressees:
     """Whom utterances address: of an addressed one the signature has, besides its patterns, -1 - the member's number.
 
     Attributes:
-        anybody: whether anybody may be addressed.
+        matter: whether it matters to any pattern whom an utterance addresses.
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
         self._slot, self._words = checked.addressing or ("", ())
         self._checked = checked
-        self.anybody = any(pattern.hearer is not None for pattern in every(Pattern, checked))
+        self.matter = any(pattern.hearer is not None for pattern in every(Pattern, checked))
 
     def of_filling(self, filling: int) -> int | None:
         """The member whom a sentence of the agent addresses."""
         sentences = self._checked.sentences
-        for slot, stride in zip(sentences.slots, sentences.strides, strict=True):
+        for slot, choice in zip(sentences.slots, sentences.choices(filling), strict=True):
             if slot.name == self._slot:
-                digit = filling // stride % (len(slot.words) + 1)
-                return self._words[digit] if digit < len(self._words) else None
+                return None if choice is None else self._words[choice]
         return None
 
     def joined(self, patterns: frozenset[int], to: int | None) -> frozenset[int]:
         """The signature of an utterance."""
-        return patterns | {-1 - to} if self.anybody and to is not None and patterns else patterns
+        return patterns | {-1 - to} if self.matter and to is not None and patterns else patterns
 
     def hears(self, pattern: Pattern, signature: frozenset[int]) -> bool:
         """Whether the ears of a pattern hear what has this signature, and want to."""
@@ -251,6 +252,8 @@ def _decide(term: Term) -> Term:
         )
     if isinstance(term, terms.Logic):
         return _decide_logic(term)
+    if isinstance(term, terms.Operation):
+        return _decide_operation(term)
     if isinstance(term, terms.Compare) and isinstance(term.left, terms.Select):
         return _decide_compared(term, term.left)
     if isinstance(term, terms.Select):
@@ -260,6 +263,28 @@ def _decide(term: Term) -> Term:
     if isinstance(term, terms.ReadEach):
         return term.known() or term
     return term
+
+
+def _decide_operation(term: terms.Operation) -> Term:
+    """A sum of known values, and the like; left as it is where its type would cut it."""
+    if term.op not in _ARITHMETIC:
+        return term
+    values = [arg.value for arg in term.args if isinstance(arg, Const)]
+    if len(values) < len(term.args):
+        return term
+    result = reduce(_ARITHMETIC[term.op], values)
+    return Const(term.type, result) if term.type.low <= result <= term.type.high else term
+
+
+_ARITHMETIC: dict[str, Callable[[int, int], int]] = {
+    "+": add,
+    "-": sub,
+    "*": mul,
+    "//": lambda left, right: left // right if right else 0,
+    "%": lambda left, right: left % right if right else 0,
+    "min": min,
+    "max": max,
+}
 
 
 def _decide_logic(term: terms.Logic) -> Term:
@@ -306,11 +331,16 @@ def _decide_compared(term: terms.Compare, left: terms.Select) -> Term:
 
 def _decide_quantified(term: terms.Quantified) -> Term:
     """Any and all are an `or` and an `and` over the items."""
-    parts = tuple(substitute(term.condition or TRUE, term.variable, item) for item in term.items)
+    parts = tuple(_decided(substitute(term.condition or TRUE, term.variable, item)) for item in term.items)
     if not parts:
         return _truth(term.op == "all")
     op: Any = "or" if term.op == "any" else "and"
-    return _decide(terms.Logic(op, tuple(_decide(part) for part in parts)))
+    return _decide(terms.Logic(op, parts))
+
+
+def _decided(term: Term) -> Term:
+    """A term some of whose innermost parts have become known."""
+    return _decide(rebuilt(term, _decided))
 
 
 # -- what can change in an episode: who moves, turns, leaves and appears, and with that the value of a term --
@@ -324,7 +354,7 @@ class When(IntEnum):
     """When a value can change; of several the greatest counts."""
 
     NEVER = 0
-    STATUSES = 1  # only when the status or presence of an object does
+    MARKED = 1  # only where Register.CHANGED is set: with the status or presence of an object, or by rules
     ANY_TIME = 2
 
 
@@ -334,7 +364,7 @@ class Changes:
     def __init__(self, checked: CheckedScenario) -> None:
         self.entities = checked.entities
         self.occlusion = checked.room.occlusion
-        self.written = {path for plan in plans(checked) for item in plan.sets for path in item.paths}
+        self.set_by_rules = {path for plan in plans(checked) for item in plan.sets for path in item.paths}
         self.changed = {
             number
             for plan in plans(checked)
@@ -342,7 +372,7 @@ class Changes:
             for entity in effect.entities
             for number in numbers_of(entity)
         }
-        self.written |= {item.path for item in checked.remembered}
+        self.written = {item.path for item in checked.remembered}
         self.written |= {belief.path for belief in checked.beliefs}
         self.written |= {f"{frame.member}.{part}" for frame in checked.frames for part in ("frame", "clock")}
         mobility = Mobility(checked)
@@ -372,8 +402,9 @@ class Changes:
             case terms.InState() | terms.Chance() | terms.Quantified(op="pick"):
                 return When.ANY_TIME
             case terms.Read():
-                is_memory = term.path.startswith("memory.")
-                return When.ANY_TIME if is_memory or term.path in self.written else When.NEVER
+                if term.path.startswith("memory.") or term.path in self.written:
+                    return When.ANY_TIME
+                return When.MARKED if term.path in self.set_by_rules else When.NEVER
             case terms.FieldOf():
                 return max(self.of(term.entity), self._field(term))
             case terms.CellOf():
@@ -425,7 +456,7 @@ class Changes:
         if term.name == "dir":
             return self._direction(term.entity)
         if term.name == "status":
-            return max(When.STATUSES if thing.role == "object" else When.NEVER for thing in things)
+            return max(When.MARKED if thing.role == "object" else When.NEVER for thing in things)
         return When.ANY_TIME
 
     def _test(self, term: terms.Test) -> When:
@@ -450,7 +481,7 @@ class Changes:
 
     def _line_of_sight(self) -> When:
         """When what stands in between can change."""
-        return When.ANY_TIME if self.objects_move else When.STATUSES
+        return When.ANY_TIME if self.objects_move else When.MARKED
 
     def _things(self, term: Term) -> list[Entity]:
         return [self.entities[number] for number in numbers_of(term)]
@@ -468,7 +499,7 @@ class Changes:
         gone = [thing for thing in things if thing.number in self.vanishing]
         if not gone:
             return When.NEVER
-        return When.STATUSES if all(thing.role == "object" for thing in gone) else When.ANY_TIME
+        return When.MARKED if all(thing.role == "object" for thing in gone) else When.ANY_TIME
 
     def _direction(self, term: Term) -> When:
         if term.type.kind == "cell":

@@ -108,8 +108,9 @@ def _field_ranges(program: Program, entity: int, width: int, height: int) -> dic
 
 def pointing_range(program: Program, entity: int) -> Interval:
     """Of an NPC where it points, of an object who carries it."""
-    carriers = program.header(Header.NPCS) + 1
-    return (0, carriers if program.entities[entity].role == "object" else 4)
+    if program.entities[entity].role == "object":
+        return 0, program.header(Header.NPCS) + 1
+    return 0, CELL + 32 * program.header(Header.CANVAS_HEIGHT) - 1
 
 
 class Known:
@@ -392,6 +393,8 @@ class _Check:
         if which not in _SETTABLE:
             return f"field {which} is not to be set like this"
         first, last = self.interval(a)
+        if which == Field.POINTING and first <= self.h(Header.NPCS) and (problem := self.within(c, 0, 4)):
+            return problem
         for entity in range(first, last + 1):
             register = FIRST_ENTITY + ENTITY_FIELDS * entity + which
             if problem := self.known.write(register, self.interval(c)):
@@ -447,7 +450,12 @@ class _Check:
     def _point(self) -> str | None:
         if self.is_agents:
             return "the agent cannot point"
-        return self.within(self.words[0], 1, self.h(Header.NPCS))
+        where, bounds = self.words[1], self.known.ranges
+        if self.interval(where)[0] < bounds.first_cell - 1:
+            problem = self.within(where, 0, 3)
+        else:
+            problem = self.within(where, bounds.first_cell - 1, bounds.last_cell)
+        return problem or self.within(self.words[0], 1, self.h(Header.NPCS))
 
     def _put(self) -> str | None:
         x = self.words[1]

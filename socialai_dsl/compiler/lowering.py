@@ -19,7 +19,6 @@ from socialai_dsl.compiler.activities import (
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
-    ComputedStatuses,
     Deferred,
     Effects,
     Homes,
@@ -29,9 +28,9 @@ from socialai_dsl.compiler.effects import (
     tick,
 )
 from socialai_dsl.compiler.expressions import Expressions, Lines, chance_word, note_what_is_said
-from socialai_dsl.compiler.folding import FALSE, SEVERAL, Classes, Facts, fold, fold_whole
+from socialai_dsl.compiler.folding import FALSE, SEVERAL, Classes, Facts, fold, fold_whole, mentions
 from socialai_dsl.compiler.questions import ask
-from socialai_dsl.compiler.setup import require, reset
+from socialai_dsl.compiler.setup import ComputedStatuses, require, reset
 from socialai_dsl.compiler.step_order import (
     Again,
     Enter,
@@ -321,7 +320,7 @@ class _FrameCompiler:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))
 
     def _effects(self, to: Expressions) -> Effects:
-        return Effects(to, self.shared.lines, self.shared.homes)
+        return Effects(to, self.shared.lines, self.shared.homes, self.shared.computed.read)
 
     # --- frames by states ---
 
@@ -425,6 +424,7 @@ class _FrameCompiler:
             elif isinstance(node, Enter):
                 exits.append((node.nested, Label()))
                 if goes_on:
+                    self._be_in(to, first_entry(node.nested), node.nested.when, node.nested.going)
                     self._enter(to, node.nested, exits[-1][1])
             elif isinstance(node, Again) and goes_on:
                 self._another_round(to, node.nested, exits[-1][1])
@@ -464,6 +464,19 @@ class _FrameCompiler:
         block.bind(inside)
         return left
 
+    def _be_in(self, to: Expressions, entry: int, *asked: object) -> bool:
+        """Go to an entry before it is asked whether it begins, where that is about the frame's own state or clock.
+
+        Whether it went.
+        """
+        member = self.frame.member
+        goes = mentions(asked, terms.InState, lambda term: term.member == member) or mentions(
+            asked, terms.Read, lambda term: term.path == f"{member}.clock"
+        )
+        if goes:
+            to.block.emit(Op.GOTO, self.number, entry)
+        return goes
+
     def _enter(self, to: Expressions, nested: NestedSteps, exit: Label) -> None:
         """Fall through if a first round begins."""
         for condition in (nested.when, nested.going):
@@ -483,6 +496,7 @@ class _FrameCompiler:
     def _another_round(self, to: Expressions, nested: NestedSteps, exit: Label) -> None:
         """Fall through if another round begins, and count it."""
         self._count_round(to, nested, exit)
+        self._be_in(to, first_entry(nested), nested.going, nested.until)
         self._unless_over(to, nested, exit)
 
     def _count_round(self, to: Expressions, nested: NestedSteps, last: Label) -> None:
@@ -496,11 +510,11 @@ class _FrameCompiler:
 
     def _take_or_leave(self, to: Expressions, entry: int) -> bool:
         """As `_take`, of an entry that begins unless it is left out."""
-        left = Label()
-        when = self.frame.steps[entry].when
-        if when is not None:
-            to.sited_condition(when, left)
-        goes_on = self._take(to, entry, begins=True)
+        left, step = Label(), self.frame.steps[entry]
+        is_there = self._be_in(to, entry, step.when, step.activity if self._skippable(step) else None)
+        if step.when is not None:
+            to.sited_condition(step.when, left)
+        goes_on = self._take(to, entry, begins=not is_there)
         to.block.bind(left)
         return goes_on or bool(left.uses)
 
@@ -632,7 +646,7 @@ def _world_rule(to: Expressions, allocation: Allocation, rule: RulePlan, asked: 
     mark = block.taken
     fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
     _conditions(to, rule, asked, following, fired)
-    effects = Effects(to, allocation.lines, allocation.homes)
+    effects = Effects(to, allocation.lines, allocation.homes, allocation.computed.read)
     effects.emit(rule, len(allocation.rules) - 1, asked.nothing("values", following))
     if fired is not None:
         block.emit(Op.LOAD, fired, constant(1))

@@ -1,4 +1,4 @@
-"""Reset code: the room, then every draw and placement in order, except those that a layout pins."""
+"""Reset code: the room, then every draw and placement in order, except those that a layout pins; computed statuses."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from socialai_dsl.compiler.cells import (
     keep_each,
     keep_shape,
 )
-from socialai_dsl.compiler.effects import ComputedStatuses, Homes
+from socialai_dsl.compiler.effects import Homes
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.folding import fold, mentions
+from socialai_dsl.compiler.folding import Changes, When, fold, mentions
 from socialai_dsl.compiler.hands import into_hands
 from socialai_dsl.compiler.step_order import first_entry
+from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (
     CheckedScenario,
     Coloring,
+    Computed,
     Drawn,
     Entity,
     Facing,
@@ -106,11 +108,11 @@ class Places:
             block.emit(Op.MIN, target, target, constant(size - 1))
 
     def _union(self, regions: tuple[Region, ...], overlap: bool) -> int:
-        first, *rest = [self._region(region, overlap) for region in regions]
-        for board in rest:
-            self.to.block.emit(Op.B_OR, first, board)
-        self.to.block.release_boards(first + 1)
-        return first
+        board = self._region(regions[0], overlap)
+        for region in regions[1:]:
+            self.to.block.emit(Op.B_OR, board, self._region(region, overlap))
+            self.to.block.release_boards(board + 1)
+        return board
 
     def _region(self, region: Region, overlap: bool) -> int:
         block = self.to.block
@@ -410,3 +412,54 @@ def _facing(to: Expressions, item: Facing, pinned: Label) -> None:
         block.emit(Op.LOAD, register, to.sited_value(item.value))
     else:
         block.emit(Op.DRAW, register, constant(4), to.sites.row(item.site))
+
+
+# -- statuses that follow from conditions ----------------------------------------------------------------------
+
+
+class ComputedStatuses:
+    """The computed statuses of a scenario: those that a reset decides for good, and those that are settled.
+
+    Attributes:
+        read: paths of registers on whose change statuses are settled again; none where that is done all the time.
+    """
+
+    def __init__(self, checked: CheckedScenario) -> None:
+        changes = Changes(checked)
+        whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
+        for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
+        self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
+        self.settled = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if not fixed)
+        self.settle_always = any(when == When.ANY_TIME for _, when in whens)
+        conditions = () if self.settle_always else [item.condition.term for item in self.settled]
+        self.read = frozenset(read.path for read in every(terms.Read, conditions))
+
+    def fix(self, to: Expressions) -> None:
+        """Emit those that never change, each unless a layout gives the status."""
+        for item in self.fixed:
+            pinned = Label()
+            to.block.span = item.condition.span
+            to.block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0, pinned)
+            _settle(to, item)
+            to.block.bind(pinned)
+
+    def settle(self, to: Expressions) -> None:
+        """Emit those that can change, each after those it reads."""
+        for item in self.settled:
+            _settle(to, item)
+
+
+def _settle(to: Expressions, item: Computed) -> None:
+    """On while the condition holds; off where it was on and the condition does not hold; else left alone."""
+    block = to.block
+    status = entity_register(item.entity, Field.STATUS)
+    entity, on, off = (constant(number) for number in (item.entity, item.on, item.off))
+    false, done = Label(), Label()
+    to.sited_condition(item.condition, false)
+    block.test(Op.IF_NE, status, on, done)
+    block.emit(Op.BECOME, entity, on)
+    block.skip(done)
+    block.bind(false)
+    block.test(Op.IF_EQ, status, on, done)
+    block.emit(Op.BECOME, entity, off)
+    block.bind(done)

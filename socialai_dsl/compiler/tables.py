@@ -422,7 +422,7 @@ class _Code:
             Header.RESET_PC: named | set_up,
             Header.REQUIRE_PC: frozenset((int(Register.ACCEPTED),)),
         }
-        self.named = named
+        self.written_by_default = named | {int(Register.CHANGED)}
         self.of_agent = _of_agent(program)
         self.is_agents = False
 
@@ -475,7 +475,7 @@ class _Code:
                 raise InvalidProgramError(f"at {pc}: HALT inside a loop")
             return
         before = known.copy()
-        writable = self.writable.get(entry, self.named)
+        writable = self.writable.get(entry, self.written_by_default)
         problem = problem_of((op, a, b, c), self.program, known, writable, self.is_agents)
         if problem:
             raise InvalidProgramError(f"at {pc}, {Op(op).name} {a} {b} {c}: {problem}")
@@ -587,7 +587,7 @@ def _header(program: Program) -> None:
     sets, words = h(Header.CLASS_SETS), h(Header.CLASS_SET_WORDS)
     _require(0 <= sets < 32768 and (not sets or 32 * words >= h(Header.CLASSES)), "a class in no set")
     more = bool(h(Header.FLAGS) & Flag.SHOWS_CARRYING)
-    _require(h(Header.CHANNELS) - more in (4, 6), f"a picture of {h(Header.CHANNELS)} channels")
+    _require(h(Header.CHANNELS) - more in (4, 6, 8), f"a picture of {h(Header.CHANNELS)} channels")
     _require(0 <= h(Header.SLOPE) <= 1000, f"SLOPE is {h(Header.SLOPE)}")
     for offset in _OFFSETS:
         _require(Header.END <= h(offset) <= len(program.words), f"{offset.name} is {h(offset)}")

@@ -31,6 +31,7 @@ from socialai_dsl.engine.views import view_table
 from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
 _PLAIN_CHANNELS: Final = 4
+_TWO_GESTURES: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +222,7 @@ def _link(
     parts: Sequence[Part],
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
-    shown = _shown(parts)
+    shown, more = _shown(parts), _more(parts)
     words: list[NDArray[np.int32]] = []
     views: dict[tuple[int, int], int] = {}
     offsets, first_counters = [], []
@@ -256,7 +257,7 @@ def _link(
             tables += table
         own = _with_tokens(part)
         entities = int(own[Header.ENTITIES])
-        link[Link.MORE], link[Link.LOOKS] = _more(parts), len(part.looks)
+        link[Link.MORE], link[Link.LOOKS] = more, len(part.looks)
         link[Link.LOOK_REGISTER_AT] = len(own) - entities * len(part.looks)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
         own[Header.FLAGS] |= _traits(own) | shown
@@ -274,7 +275,10 @@ def _shown(parts: Sequence[Part]) -> int:
     for part in parts:
         carrying = int(part.words[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
         shown |= (Trait.HANDS | Trait.MORE) * carrying
-        shown |= Trait.GESTURES * int(part.words[Header.CHANNELS] - carrying > _PLAIN_CHANNELS)
+        gestures = part.words[Header.CHANNELS] - carrying - _PLAIN_CHANNELS
+        shown |= Trait.GESTURES * int(gestures > 0) | (Trait.CELLS | Trait.MORE) * int(
+            gestures > _TWO_GESTURES
+        )
         shown |= Trait.MORE * bool(part.looks)
     return shown
 
@@ -282,7 +286,7 @@ def _shown(parts: Sequence[Part]) -> int:
 def _more(parts: Sequence[Part]) -> int:
     """How many channels pictures have behind the fourth; those of looks are the last."""
     shown = _shown(parts)
-    others = 2 * bool(shown & Trait.GESTURES) + bool(shown & Trait.HANDS)
+    others = 2 * bool(shown & Trait.GESTURES) + 2 * bool(shown & Trait.CELLS) + bool(shown & Trait.HANDS)
     return max((others, *(1 + place for part in parts for place in part.looks)))
 
 

@@ -10,6 +10,7 @@ from socialai_dsl.engine.calls import BAD_ACTION, NO_ROOM, TERMINATED, Task
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.pointers import (
+    bare,
     bytes_of,
     float64_of,
     int16_of,
@@ -154,6 +155,11 @@ def serve(book: Any, task: int, rows: int) -> int:
     Returns:
         How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
+    return _serve(bare(book), task, rows)
+
+
+@inline
+def _serve(book: Any, task: int, rows: int) -> int:
     ended = 0
     if task != Task.RESET and not _actions_fit(book, rows):
         return BAD_ACTION

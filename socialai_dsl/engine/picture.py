@@ -8,18 +8,19 @@ from numpy.typing import NDArray
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.boards import object_look
 from socialai_dsl.engine.carrying import carried_by
-from socialai_dsl.engine.entities import field, is_present, npc_at, step_x, step_y
+from socialai_dsl.engine.entities import field, is_present, npc_at, quadrant, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import bytes_of, uint16_of
 from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
-from socialai_dsl.program import LAST_ACTS, NO_GESTURE, VIEW, Body, Field, Flag, Header
+from socialai_dsl.program import CELL, LAST_ACTS, NO_GESTURE, POINTING_HERE, VIEW, Body, Field, Flag, Header
 from socialai_dsl.vocabulary import NPC
 
 _HALF = np.int64(VIEW // 2)
 _EVERYWHERE = np.uint64((1 << 64) - 1)
 _WITH_GESTURES = 6
+_WITH_CELLS = 8
 _WORDS_OF_ACTS = {
     Body.FORWARD: "forward",
     Body.LEFT: "left",
@@ -132,10 +133,10 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
 
 @outline
 def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) -> None:
-    """As `_show_npcs`, where pictures of the batch also show what NPCs carry, or looks."""
+    """As `_show_npcs`, where pictures of the batch also show which cells NPCs point at, what they carry, or looks."""
     stay_outline()
     flags = row.program[Header.FLAGS]
-    gestures = 2 if flags & Trait.GESTURES else 0
+    gestures = (2 if flags & Trait.GESTURES else 0) + (2 if flags & Trait.CELLS else 0)
     more = row.program[link + Link.MORE]
     for i in range(more * CELLS):
         extra[i] = NO_GESTURE
@@ -151,20 +152,38 @@ def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[n
         if flags & Flag.EGOCENTRIC:
             row.image[place] = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
         shows = np.int64(flags & Flag.SHOWS_CARRYING != 0)
-        if row.program[Header.CHANNELS] - shows == _WITH_GESTURES:
+        if row.program[Header.CHANNELS] - shows >= _WITH_GESTURES:
             gesture = _gesture(row, npc, own)
             extra[more * place] = gesture & 0xFF
             extra[more * place + 1] = gesture >> 8
+        if row.program[Header.CHANNELS] - shows == _WITH_CELLS and field(row, npc, Field.POINTING) >= CELL:
+            dx, dy = _way_to_cell(row, npc)
+            extra[more * place + 2] = POINTING_HERE + dy * step_x(own) - dx * step_y(own)
+            extra[more * place + 3] = POINTING_HERE + dx * step_x(own) + dy * step_y(own)
         carried = carried_by(row, npc)
         if shows and carried != 0:
             look = object_look(row, carried)
             extra[more * place + gestures] = (look & 0xFF) | (look >> 8 & 0xFF) << 5
         _show_looks(row, link, extra, place, npc)
+    # The commonest numbers, written out: loops with constant bounds are unrolled.
+    if more == 1:
+        _join(row, extra, picture, 1)
+    elif more == 2:
+        _join(row, extra, picture, 2)
+    else:
+        _join(row, extra, picture, more)
+
+
+@inline
+def _join(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8], more: int) -> None:
+    """Write the channels of `image` and `extra` side by side."""
     for i in range(CELLS):
+        place = (4 + more) * i
+        look = row.image[i]  # read once: the compiler does not know that `picture` is no part of it
         for k in range(4):
-            picture[(4 + more) * i + k] = row.image[i] >> 8 * k & 0xFF
+            picture[place + k] = look >> 8 * k & 0xFF
         for k in range(more):
-            picture[(4 + more) * i + 4 + k] = extra[more * i + k]
+            picture[place + 4 + k] = extra[more * i + k]
 
 
 @inline
@@ -219,9 +238,20 @@ def _gesture(row: Row, npc: int, own: int) -> int:
     pointing = np.int64(NO_GESTURE)
     act = _ACTS[field(row, npc, Field.LAST)]
     if field(row, npc, Field.POINTING) > 0:
-        pointing = field(row, npc, Field.POINTING) - 1
+        if field(row, npc, Field.POINTING) >= CELL:
+            dx, dy = _way_to_cell(row, npc)
+            pointing = quadrant(dx, dy)
+        else:
+            pointing = field(row, npc, Field.POINTING) - 1
         if row.program[Header.FLAGS] & Flag.EGOCENTRIC:
             pointing = _relative(pointing, own)
         if field(row, npc, Field.LAST) == Body.POINT:
             act += pointing
     return act << 8 | pointing
+
+
+@inline
+def _way_to_cell(row: Row, npc: int) -> tuple[int, int]:
+    """How far to the right and down of an NPC the cell lies that it points at."""
+    cell = field(row, npc, Field.POINTING) - CELL
+    return (cell & 31) - field(row, npc, Field.X), (cell >> 5) - field(row, npc, Field.Y)

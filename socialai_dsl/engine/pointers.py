@@ -108,6 +108,22 @@ bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64
 )
 """`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
 
+
+@intrinsic
+def _to_first(context: Any, array: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.make_array(array)(context, builder, arguments[0]).data
+
+    return Pointer(types.int64)(array), generate
+
+
+def _itself(book: Any) -> Any:
+    return book
+
+
+bare = _itself if config.DISABLE_JIT else _to_first
+"""A book as a pointer: handing on the array would count its references, in every step of every row."""
+
 _INDEX: Final = (types.Integer, types.IntEnumMember)
 
 

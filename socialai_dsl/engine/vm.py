@@ -192,7 +192,7 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     if op == Op.FACE:
         return paths.face(row, mover, target, c)
     if op == Op.POINT:
-        set_field(row, mover, Field.POINTING, 1 + (target & 3))
+        set_field(row, mover, Field.POINTING, target if target >= CELL else 1 + (target & 3))
         return np.int64(Body.POINT)
     if op == Op.TURN_TO:
         return paths.turn_towards(row, mover, target, c)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.program import (
+    CELL,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     Body,
@@ -110,8 +111,13 @@ def _entities(program: Program) -> list[Range]:
             Field.GONE: (0, 1),
             Field.POKED: (0, 1),
             Field.LAST: (0, int(Body.STOP_POINTING)),
-            # Of an object who carries it.
-            Field.POINTING: (0, 1 + program.header(Header.NPCS) if entity.role == "object" else 4),
+            # Of an object who carries it, of an NPC perhaps a cell.
+            Field.POINTING: (
+                0,
+                1 + program.header(Header.NPCS)
+                if entity.role == "object"
+                else CELL + 32 * program.header(Header.CANVAS_HEIGHT) - 1,
+            ),
             Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
         }
         base = FIRST_ENTITY + ENTITY_FIELDS * number

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.envs.values import Acts, Addresses, addresses_of, entry_words, shown, utterance_text
 from socialai_dsl.program import (
+    CELL,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     Body,
@@ -19,6 +20,7 @@ from socialai_dsl.program import (
     Program,
     Register,
     RegisterName,
+    place_of,
 )
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, NOUN, TURN_WORDS
 
@@ -104,7 +106,7 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
         if field[Field.LAST] != Body.NONE:
             described["last"] = TURN_WORDS[field[Field.LAST]]
         if field[Field.POINTING]:
-            described["pointing"] = DIRECTIONS[field[Field.POINTING] - 1]
+            described["pointing"] = _pointing(int(field[Field.POINTING]))
         if field[Field.TOGGLED]:
             described["toggled"] = str(program.entities[field[Field.TOGGLED]])
     elif entity.role == "object" and field[Field.INSIDE]:
@@ -112,6 +114,11 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
     if entity.role != "object" and program.header(Header.FLAGS) & Flag.CARRYING:
         described |= _carried(program, registers, number)
     return described
+
+
+def _pointing(value: int) -> str | list[int]:
+    """The direction in which an NPC points, or the cell at which it points."""
+    return list(place_of(value)) if value >= CELL else DIRECTIONS[value - 1]
 
 
 def _carried(program: Program, registers: Row, who: int) -> dict[str, Any]:

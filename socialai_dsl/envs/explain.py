@@ -31,6 +31,7 @@ from socialai_dsl.program import (
     LineColumn,
     Program,
     Register,
+    place_of,
 )
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.scenario import Model
@@ -107,7 +108,7 @@ class Moment:
     def _cell(self, number: int) -> Cell | None:
         """Where an entity is; a goal may be a cell itself."""
         if number >= CELL:
-            return (number - CELL) % 32, (number - CELL) // 32
+            return place_of(number)
         fields = self.registers[FIRST_ENTITY + ENTITY_FIELDS * number :]
         if fields[Field.GONE] or fields[Field.X] < 0:
             return None

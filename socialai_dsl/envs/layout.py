@@ -22,6 +22,7 @@ from socialai_dsl.envs.values import (
     word,
 )
 from socialai_dsl.program import (
+    CELL,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -241,7 +242,15 @@ class _Layout:
             objects = [str(entity) for entity in self.program.entities]
             self._set(number, Field.TOGGLED, word(f"{key}.toggled", given["toggled"], objects))
         if given.get("pointing") is not None:
-            self._set(number, Field.POINTING, 1 + word(f"{key}.pointing", given["pointing"], DIRECTIONS))
+            self._set(number, Field.POINTING, self._pointing(f"{key}.pointing", given["pointing"]))
+
+    def _pointing(self, key: str, given: Any) -> int:
+        """A direction, or a cell."""
+        if isinstance(given, str):
+            return 1 + word(key, given, DIRECTIONS)
+        x, y = cell_pair(key, given)
+        across = whole_number(f"{key}[0]", x, 0, self.width - 1, self._hint())
+        return CELL + 32 * whole_number(f"{key}[1]", y, 0, self.height - 1, self._hint()) + across
 
     def _carries(self, number: int, given: Any) -> None:
         """What a member of the cast has in its hands."""

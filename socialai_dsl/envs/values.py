@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName
+from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName, place_of
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
@@ -128,7 +128,7 @@ def shown(program: Program, name: RegisterName, value: int) -> Any:
         case "bool":
             return bool(value)
         case "cell":
-            return NOWHERE if value < CELL else [(value - CELL) % 32, (value - CELL) // 32]
+            return NOWHERE if value < CELL else list(place_of(value))
         case "utterance":
             return utterance_text(program, value)
     return name.values[value - name.low] if name.values else value

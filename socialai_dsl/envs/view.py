@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.library import types_by_code
-from socialai_dsl.program import NO_GESTURE, VIEW, unpack_held
+from socialai_dsl.program import GESTURES, NO_GESTURE, VIEW, unpack_held
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture, gesture_shown
 from socialai_dsl.render.grid import draw_ansi, letters, own_hands, thing_words
@@ -83,9 +83,9 @@ class View:
         if "pointing" not in self.channels:
             return {}
         found = {}
-        first = self.channels.index("pointing")
+        shown = [self.channels.index(name) for name in GESTURES if name in self.channels]
         for row, column in np.argwhere(self.image[..., 0].T == tiles.NPC).tolist():
-            gesture = gesture_shown(*map(int, self.image[column, row, first : first + 2]))
+            gesture = gesture_shown(*map(int, self.image[column, row, shown]))
             pointing = None if gesture.pointing is None else (gesture.pointing + self._turn) % 4
             found[column, row] = gesture._replace(pointing=pointing)
         return found

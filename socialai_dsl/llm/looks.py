@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any, Final
 
 from socialai_dsl.library import prelude
-from socialai_dsl.program import NO_GESTURE, EntityColumn, Header, Program, unpack_held
+from socialai_dsl.program import GESTURES, NO_GESTURE, EntityColumn, Header, Program, unpack_held
 from socialai_dsl.render.gestures import gesture_shown
 from socialai_dsl.render.marks import LookWords, marks_of
 from socialai_dsl.semantics.terms import ObjectType
@@ -144,9 +144,23 @@ def _gestures(shown: Mapping[str, int], directions: tuple[str, ...]) -> dict[str
     pointing, act = shown.get("pointing", NO_GESTURE), shown.get("last_act", NO_GESTURE)
     if act == NO_GESTURE:
         return {}
-    gesture = gesture_shown(pointing, act)
+    gesture = gesture_shown(pointing, act, *(shown.get(name, NO_GESTURE) for name in GESTURES[2:]))
     towards = {} if gesture.pointing is None else {"pointing": directions[gesture.pointing]}
+    if gesture.cell is not None:
+        towards = {"pointing": f"at the cell {_beside_it(*gesture.cell)}"}
     return towards | {"last": _ACTS[gesture.act]}
+
+
+def _beside_it(right: int, nearer: int) -> str:
+    """Where a cell lies, as the reader sees it: `2 steps beyond it and 1 step to the left of it`."""
+    ways = (nearer, ("before it", "beyond it")), (right, ("to the right of it", "to the left of it"))
+    parts = [f"{steps(abs(far))} {words[far < 0]}" for far, words in ways if far]
+    return " and ".join(parts) or "that it is on"
+
+
+def steps(count: int) -> str:
+    """So many steps."""
+    return "1 step" if count == 1 else f"{count} steps"
 
 
 @cache

@@ -22,6 +22,7 @@ from socialai_dsl.llm.looks import (
     is_surface,
     kinds_of,
     phrase,
+    steps,
 )
 from socialai_dsl.program import VIEW, Flag, Header, Program
 from socialai_dsl.program_suite import Playable, channels_of, words_of_looks
@@ -224,9 +225,9 @@ def _areas(places: Iterable[Place]) -> list[Area]:
 
 def _where(place: Place) -> str:
     ahead, right = place
-    parts = [f"{_steps(ahead)} ahead"] if ahead else []
+    parts = [f"{steps(ahead)} ahead"] if ahead else []
     if right:
-        parts.append(f"{_steps(abs(right))} to the {'right' if right > 0 else 'left'}")
+        parts.append(f"{steps(abs(right))} to the {'right' if right > 0 else 'left'}")
     return " and ".join(parts)
 
 
@@ -239,7 +240,3 @@ def _extent(area: Area) -> str:
 
 def _side(right: int) -> str:
     return f"{abs(right)} {'right' if right > 0 else 'left'}" if right else "straight ahead"
-
-
-def _steps(count: int) -> str:
-    return "1 step" if count == 1 else f"{count} steps"

@@ -42,6 +42,7 @@ from socialai_dsl.program.format import (
     MOST_CHOICES,
     NO_ACTION,
     NO_GESTURE,
+    POINTING_HERE,
     SECRET,
     TEMPORARIES,
     TEMPORARY,
@@ -61,6 +62,7 @@ from socialai_dsl.program.format import (
     TypeColumn,
     pack_cell,
     pack_held,
+    place_of,
     unpack_held,
 )
 from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
@@ -87,6 +89,7 @@ __all__ = [
     "MOST_CHOICES",
     "NO_ACTION",
     "NO_GESTURE",
+    "POINTING_HERE",
     "SECRET",
     "TEMPORARIES",
     "TEMPORARY",
@@ -112,6 +115,7 @@ __all__ = [
     "TypeColumn",
     "pack_cell",
     "pack_held",
+    "place_of",
     "room_words",
     "unpack_held",
 ]

@@ -8,12 +8,13 @@ from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
 
 VERSION = 2
 TEMPORARY = 8192
-TEMPORARIES = 64
+TEMPORARIES = 1 << 15
+"""Room for the values of the largest rule that checking lets pass; only those in use are ever touched."""
 CONSTANT = 1 << 20
 SECRET = 1 << 16
 """Added to the class of a line that the agent never hears: it is said to others alone."""
-BOARDS = 8
-"""Scratch boards (sets of cells) that reset code may use."""
+BOARDS = 256
+"""Scratch boards (sets of cells): a few for each of the searches that an expression can have in each other."""
 
 ENTITY_FIELDS = 10
 FIRST_ENTITY = 32
@@ -88,8 +89,9 @@ class Header(IntEnum):
     )
     CLASS_SETS = 54
     CLASS_SET_WORDS = 55
-    # Channels of the picture: 4, 2 more with pointing and last act, 1 more with `Flag.SHOWS_CARRYING`. Looks are not
-    # counted: their table, (ENTITIES, looks), is all that follows the table at CLASS_SET_AT; see `Program.look_table`.
+    # Channels of the picture: 4, 6 with pointing and last act, 8 with cells that are pointed at, 1 more with
+    # `Flag.SHOWS_CARRYING`. Looks are not counted: their table, (ENTITIES, looks), is all that follows the table at
+    # CLASS_SET_AT; see `Program.look_table`.
     CHANNELS = 56
     END = 57
 
@@ -101,7 +103,7 @@ class Flag(IntEnum):
     PICTURE_BEFORE_NPCS = 2
     AGENT_FRAME = 4
     OWN_VOICE = 8
-    SETTLE_ALWAYS = 16  # computed statuses depend on more than the statuses of objects
+    SETTLE_ALWAYS = 16  # computed statuses depend on more than what sets Register.CHANGED
     EGOCENTRIC = 32  # the picture shows an NPC's direction as (direction - the agent's + 2) mod 4
     OCCLUSION = 64  # what is not transparent hides what lies behind it, from the agent and from `SEES`
     ROLLS = 128  # some type of object rolls
@@ -133,7 +135,9 @@ class Register(IntEnum):
     SAID_LINE = 15  # 1 + line that the entity on turn says this step, 0 none
     LAST_TURN = 16  # Body of the entity on turn
     UTTERANCE = 17  # of the agent this step: 1 + template * fillings + filling, 0 silent
-    CHANGED = 18  # 1: an object's status or presence has changed since statuses were last settled
+    CHANGED = (
+        18  # 1: a status, a presence, or what computed statuses read has changed since they were settled
+    )
     ACCEPTED = 19  # written by the code at REQUIRE_PC
     ATTEMPT = (
         20  # how many rooms of this episode were not as required; part of the key of every draw at reset
@@ -153,7 +157,7 @@ class Field(IntEnum):
     GONE = 5  # 1: not in the room
     POKED = 6  # NPC: 1 once it was poked in this episode; object: 1 while it reacts to no toggle and no push
     LAST = 7  # Body of its last turn
-    POINTING = 8  # NPC: 0 not pointing, else 1 + direction; it lasts until it stops
+    POINTING = 8  # NPC: 0 not pointing, 1 + direction, or a cell as an operand; it lasts until it stops
     CARRIER = 8  # object: 0, or 1 + the member of the cast who carries it; then it is gone
     INSIDE = 9  # object that may lie in another: number of that object
     TOGGLED = 9  # NPC: number of the object that it toggled at in its last turn, 0 if none
@@ -170,7 +174,7 @@ class Body(IntEnum):
     TOGGLE = 5
     DONE = 6
     NONE = 7
-    POINT = 8  # of NPCs only; the direction is in Field.POINTING
+    POINT = 8  # of NPCs only; the direction or the cell is in Field.POINTING
     STOP_POINTING = 9
 
 
@@ -256,7 +260,10 @@ NO_GESTURE = 255
 """In the channels behind the fourth: no NPC, or it does not point, carries nothing, or has no such look."""
 LOOKS = ("type", "color", "status", "orientation")
 """The channels that say what a cell looks like."""
-GESTURES = ("pointing", "last_act")
+GESTURES = ("pointing", "last_act", "pointing_right", "pointing_ahead")
+"""The channels of gestures: none of them, the first two, or all."""
+POINTING_HERE = 128
+"""In the last two of them: no cell to the right, or ahead, of the NPC that points at a cell."""
 CHANNELS = (*LOOKS, *GESTURES, "carrying")
 """All channels of the picture that need no declaration, in their order; behind them come looks."""
 
@@ -269,6 +276,11 @@ def pack_held(code: int, color: int) -> int:
 def unpack_held(value: int) -> tuple[int, int]:
     """Type code and colour of what the channel `carrying` shows."""
     return value & 31, value >> 5
+
+
+def place_of(cell: int) -> tuple[int, int]:
+    """The x and y of a cell that is given as an operand."""
+    return (cell - CELL) % 32, (cell - CELL) // 32
 
 
 def pack_cell(code: int, color: int = 0, status: int = 0, orientation: int = 0) -> int:

@@ -680,7 +680,7 @@ _ALL: Final = (
     _plain(
         Op.GO_NEXT_TO, "a steps along a shortest path next to b, turning at site c.", _ENTITY, _PLACE, _SITE
     ),
-    _plain(Op.POINT, "a points in direction v(b).", _ENTITY, _DIRECTION),
+    _plain(Op.POINT, "a points in direction v(b), or at the cell v(b).", _ENTITY, _VALUE),
     _plain(
         Op.CHOOSE,
         "One of b body actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a.",

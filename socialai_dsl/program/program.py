@@ -182,8 +182,8 @@ class Program:
     def channels(self) -> tuple[str, ...]:
         """Names of the channels of its picture."""
         carrying = bool(self.header(Header.FLAGS) & Flag.SHOWS_CARRYING)
-        gestures = self.header(Header.CHANNELS) - carrying > len(LOOKS)
-        shown = {*LOOKS, *(GESTURES if gestures else ()), *(["carrying"] if carrying else [])}
+        gestures = GESTURES[: self.header(Header.CHANNELS) - carrying - len(LOOKS)]
+        shown = {*LOOKS, *gestures, *(["carrying"] if carrying else [])}
         return (*(name for name in CHANNELS if name in shown), *(name for name, _ in self.looks))
 
     @property

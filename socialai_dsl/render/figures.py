@@ -1,10 +1,15 @@
 """Figures in cells: the agent as an arrow, NPCs as faces whose hat tells their kind."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from math import hypot
 from typing import Final
 
 from socialai_dsl.render.canvas import INK, WHITE, Canvas, Rgb, mix
 from socialai_dsl.render.gestures import Gesture
+
+Ray = tuple[tuple[int, int], tuple[int, int], int, Rgb]
+"""From the cell of an NPC to the one that it points at, as columns to the right and rows down; the direction of its arm
+and its colour."""
 
 _FACE: Final = (0.5, 0.565)
 _FORWARD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -66,6 +71,19 @@ def _draw_arm(canvas: Canvas, colour: Rgb, direction: int) -> None:
     canvas.line([hand, tip], fill=_SKIN, width=0.07)
 
 
+def draw_rays(canvas: Canvas, rays: Iterable[Ray]) -> None:
+    """Draw the parts in a cell of lines from the fingers of NPCs to the cells that they point at, with a ring there."""
+    for (x, y), (to_x, to_y), direction, colour in rays:
+        finger, dark = _ARMS[direction][-1], mix(colour, INK, 0.3)
+        start, goal = (x + finger[0], y + finger[1]), (to_x + 0.5, to_y + 0.5)
+        share = max(0.0, 1 - _RING / hypot(goal[0] - start[0], goal[1] - start[1]))
+        end = (start[0] + (goal[0] - start[0]) * share, start[1] + (goal[1] - start[1]) * share)
+        canvas.circle(*goal, _RING + 0.02, outline=WHITE, width=0.11)
+        canvas.line([start, end], fill=WHITE, width=0.11)
+        canvas.line([start, end], fill=dark, width=0.06)
+        canvas.circle(*goal, _RING, outline=dark, width=0.06)
+
+
 def _turn_sign(side: int) -> Callable[[Canvas], None]:
     """An arrow bent to the left (-1) or to the right (1)."""
 
@@ -109,6 +127,7 @@ def _stop_sign(canvas: Canvas) -> None:
 
 
 _SIGN: Final = (0.2, 0.2)
+_RING: Final = 0.42
 _SKIN: Final[Rgb] = (252, 206, 160)
 _ARMS: Final = (
     ((0.46, 0.85), (0.74, 0.85), (0.93, 0.85)),

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from socialai_dsl.library import types_by_code
 from socialai_dsl.render import tiles
+from socialai_dsl.render.figures import Ray
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import Marks, mark_words
-from socialai_dsl.render.tiles import SEEN_LINE, Code, draw_tile
+from socialai_dsl.render.tiles import PALETTE, SEEN_LINE, Code, draw_tile
 from socialai_dsl.vocabulary import COLORS
 
 _ARROWS: Final = ">v<^"
@@ -64,12 +65,30 @@ def draw_grid(
             gesture = gestures.get((column, row)) if gestures else None
             carried = held.get((column, row)) if held else None
             looks = marks.get((column, row), ()) if marks else ()
-            cells.append(draw_tile(code, here, lit, tile, under, gesture, carried, looks))
+            crossing = _rays_at(column, row, codes, gestures or {})
+            cells.append(draw_tile(code, here, lit, tile, under, gesture, carried, looks, crossing))
         rows.append(np.concatenate(cells, axis=1))
     picture = np.concatenate(rows, axis=0)
     if seen is not None:
         _outline(picture, seen, tile)
     return picture
+
+
+def _rays_at(
+    column: int, row: int, codes: NDArray[np.uint8], gestures: Mapping[tuple[int, int], Gesture]
+) -> tuple[Ray, ...]:
+    """The lines from NPCs to the cells that they point at, as far as they may come through a cell."""
+    found: list[Ray] = []
+    for (x, y), gesture in gestures.items():
+        if gesture.cell is None or gesture.pointing is None:
+            continue
+        start = x - column, y - row
+        end = start[0] + gesture.cell[0], start[1] + gesture.cell[1]
+        if min(start[0], end[0]) <= 0 <= max(start[0], end[0]) and min(start[1], end[1]) <= 0 <= max(
+            start[1], end[1]
+        ):
+            found.append((start, end, gesture.pointing, PALETTE[codes[y, x, 1] % len(PALETTE)]))
+    return tuple(found)
 
 
 def _outline(picture: NDArray[np.uint8], seen: NDArray[np.bool_], tile: int) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.library import types_by_code
 from socialai_dsl.render.canvas import INK, PAPER, WHITE, Canvas, Rgb, mix
-from socialai_dsl.render.figures import draw_agent, draw_gesture, draw_npc, turn
+from socialai_dsl.render.figures import Ray, draw_agent, draw_gesture, draw_npc, draw_rays, turn
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import Marks, draw_marks, draw_patterns, sized
 from socialai_dsl.vocabulary import EMPTY as EMPTY
@@ -47,6 +47,7 @@ def draw_tile(
     gesture: Gesture | None = None,
     held: Code | None = None,
     marks: Marks = (),
+    rays: tuple[Ray, ...] = (),
 ) -> NDArray[np.uint8]:
     """Draw one cell.
 
@@ -59,6 +60,7 @@ def draw_tile(
         gesture: where an NPC points and what it did last; None where that is not shown.
         held: what who stands here carries; None for nothing.
         marks: the looks of what is here; where the agent stands, of what it carries.
+        rays: from NPCs to cells that they point at, as seen from this cell.
 
     Returns:
         A read-only array, uint8 (size, size, 3).
@@ -77,6 +79,7 @@ def draw_tile(
         draw_marks(canvas, marks)
     if held is not None:
         _draw_held(canvas, held, marks if agent_direction is not None else ())
+    draw_rays(canvas, rays)
     pixels = canvas.pixels()
     pixels.setflags(write=False)
     return pixels

@@ -21,8 +21,12 @@ Direction = Annotated[int, Field(ge=0, le=3)]
 """0 right, 1 down, 2 left, 3 up."""
 Look = tuple[_Code, _Code, _Code, _Code]
 """Type, colour, status and orientation of a cell, as in the observation."""
-Gesture = tuple[_Number, Annotated[int, Field(ge=-1, le=3)], str]
-"""Cell, direction in which the NPC there points (-1: none), and what it did last."""
+Gesture = (
+    tuple[_Number, Annotated[int, Field(ge=-1, le=3)], str]
+    | tuple[_Number, Annotated[int, Field(ge=-1, le=3)], str, int, int]
+)
+"""Cell, direction in which the NPC there points (-1: none), and what it did last; where it is shown, how far to
+the right and down the cell lies that it points at."""
 
 
 Mark = tuple[str, str, _Number, _Number]

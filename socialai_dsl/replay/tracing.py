@@ -296,7 +296,12 @@ def _number(known: dict[Any, int], one: Any) -> int:
 
 def _gestures(found: Mapping[tuple[int, int], Gesture], width: int) -> list[document.Gesture]:
     return [
-        (y * width + x, -1 if gesture.pointing is None else gesture.pointing, gesture.act)
+        (
+            y * width + x,
+            -1 if gesture.pointing is None else gesture.pointing,
+            gesture.act,
+            *(gesture.cell or ()),
+        )
         for (x, y), gesture in found.items()
         if gesture.words
     ]

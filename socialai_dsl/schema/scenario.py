@@ -472,7 +472,8 @@ class ObjectGroup(Model):
     )
 
 
-Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act", "carrying"]
+_Aim = Literal["pointing_right", "pointing_ahead"]
+Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act", _Aim, "carrying"]
 CHANNELS: tuple[Channel, ...] = get_args(Channel)
 """Channels that need no declaration; each of `looks` is one as well."""
 
@@ -488,8 +489,7 @@ class Observe(Model):
     own_voice: bool = Field(False, description="whether the agent hears itself")
     channels: Annotated[tuple[Channel | Word, ...], BeforeValidator(_as_tuple)] | None = Field(
         None,
-        description="of the image: the first four, and perhaps the next two, carrying, and looks; default the first "
-        "four, carrying where something can be carried, and all looks",
+        description="the first 4, 6 or 8, carrying, looks; default: 4, carrying where something can be carried, looks",
         examples=[["type", "color", "status", "orientation", "carrying"]],
     )
     tone: Word | None = Field(
@@ -565,9 +565,7 @@ class Property(Model):
         None, description="the variant `oracle` acts on its perceptions alone"
     )
     needs: Names | None = Field(None, description="members without which an agent can only guess")
-    only_through: OnlyThrough | None = Field(
-        None, description="the members whose cues alone may reveal a draw"
-    )
+    only_through: OnlyThrough | None = Field(None, description="members whose cues alone may reveal a draw")
     knowable: bool | None = Field(
         None,
         description="whether an agent can perceive in time the draws that its success depends on (tried by default)",
@@ -673,6 +671,9 @@ class Scenario(Model):
     skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="the skills that it needs, for people"
     )
+    training_frames: int | None = Field(
+        None, ge=1, description="how long the recipe guided trains an agent for"
+    )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
     earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
     overheard: bool = Field(True, description="whether others within earshot hear what is said to one")
@@ -680,16 +681,13 @@ class Scenario(Model):
         PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
     )
     params: dict[Word, int | bool | float | str | Parameter] = Field(
-        default_factory=dict,
-        description="name: default of parameters, used as $name and given as ?name=value",
+        default_factory=dict, description="name: default of parameters, used as $name, given as ?name=value"
     )
     grammar: Annotated[UtteranceGrammar, as_written(UtteranceGrammar | Word)] = Field(
         description="the agent's utterances: written out, or the name of a shared grammar"
     )
     room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
-    order: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="order of placement"
-    )
+    order: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field((), description="placement order")
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
         description="name: an object in the room",

@@ -436,8 +436,8 @@ _STAND_INS: Final[Mapping[str, object]] = {
 """What stands for the parts that every scenario needs where a file lacks them, so that its other mistakes are found."""
 
 _INDIFFERENT: Final = frozenset(
-    "scenario outcome room about notes skills horizon earshot view kind kind_code audible color facing reward id after "
-    "chance once npcs image names own_voice canvas actions do".split()
+    "scenario outcome room about notes skills training_frames horizon earshot view kind kind_code audible color facing "
+    "reward id after chance once npcs image names own_voice canvas actions do".split()
 )
 """Keys whose loss makes nothing else in the file wrong."""
 

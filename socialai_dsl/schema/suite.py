@@ -91,6 +91,9 @@ class Suite(Model):
     skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="the skills that it needs, for people"
     )
+    training_frames: int | None = Field(
+        None, ge=1, description="how long the recipe guided trains an agent for"
+    )
     draw: Literal["uniform", "in_sequence"] = Field(
         "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"
     )

@@ -48,6 +48,7 @@ from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
     TURN,
+    CellOf,
     Compare,
     Const,
     FieldOf,
@@ -103,7 +104,7 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
     if name == "search":
         assert isinstance(node, ast.Call), "internal: it has an argument"
         return Activity(name, (resolver.value(replace(node, name="sees"), BOOL, scope),), site, span)
-    if name in ("push", "point", "follow"):
+    if name in ("push", "point", "point_at", "follow"):
         return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
     terms = tuple(
         _argument(resolver, name, arg, _TYPES[takes], scope)
@@ -115,21 +116,22 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
 def _check_mover(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> None:
     """The agent has no arm to point with, so a frame that it follows cannot either."""
     looked_at = scope.frame is not None and scope.frame.looked_at
-    if name in ("point", "stop_pointing") and scope.member == AGENT and not looked_at:
+    if name in ("point", "point_at", "stop_pointing") and scope.member == AGENT and not looked_at:
         raise resolver.fail("S204", "the agent cannot point; only NPCs do", node, scope)
 
 
 def _at_something(
     resolver: Resolver, name: str, args: tuple[ast.Expr, ...], written: Activity, scope: Scope
 ) -> Activity:
-    """push(x, direction); point(x), which is the direction in which x lies; follow(x), walking next to it for ever."""
+    """What a few activities are about, such as of point(x) the direction in which x lies, of point_at(x) its cell."""
     if name == "follow":
         return replace(written, name="go_next_to", args=(_argument(resolver, name, args[0], ENTITY, scope),))
     if name == "point":
         assert scope.member is not None, "internal: an activity is somebody's"
-        own = entity(resolver.symbols.numbers[scope.member])
-        way = Measure(DIRECTION, "dir_to", (own, resolver.somewhere(args[0], scope)))
-        return replace(written, name="point", args=(way,))
+        there = entity(resolver.symbols.numbers[scope.member]), resolver.somewhere(args[0], scope)
+        return replace(written, name="point", args=(Measure(DIRECTION, "dir_to", there),))
+    if name == "point_at":
+        return replace(written, name="point", args=(CellOf(CELL, resolver.somewhere(args[0], scope)),))
     what = _argument(resolver, name, args[0], ENTITY, scope)
     for number in what.type.values:
         objects = resolver.symbols.object_of(number)

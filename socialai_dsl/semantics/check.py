@@ -24,7 +24,15 @@ from socialai_dsl.semantics import (
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import Known, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
-from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, OutcomePlan, PropertyPlan
+from socialai_dsl.semantics.plans import (
+    CheckedScenario,
+    Drawn,
+    FramePlan,
+    OutcomePlan,
+    PropertyPlan,
+    RulePlan,
+    StepPlan,
+)
 from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.probes import probes
 from socialai_dsl.semantics.resolve import ScenarioResolver
@@ -322,6 +330,9 @@ MAX_BODIES: Final = 128
 MAX_REGISTERS: Final = 4096
 """How many registers a scenario may have; an environment's row holds twice as many numbers."""
 
+MAX_CHANGES: Final = 2048
+"""How many registers and things one rule may change; the engine has sixteen times as many temporaries for values."""
+
 
 def check_meaning(
     scenario: Scenario,
@@ -480,6 +491,14 @@ class _Run:
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
         asked = probes(resolver)
+        for rule in rules:
+            self._look_at_size(rule)
+        for plan in plans:
+            for state in plan.states:
+                for one in (*state.first, *state.then):
+                    self._look_at_size(one)
+            for step in plan.steps:
+                self._look_at_size(step)
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -526,6 +545,18 @@ class _Run:
             accepting=accepting,
             readings=resolver.readings,
         )
+
+    def _look_at_size(self, rule: RulePlan | StepPlan) -> None:
+        """Report a rule or an entry that changes more at once than a program has room for."""
+        sets = [item.value.span for item in rule.sets]
+        causes = [effect.span for effect in rule.causes for _ in effect.entities]
+        changed = sets + causes
+        if len(changed) > MAX_CHANGES:
+            message = (
+                f"a rule changes at most {MAX_CHANGES:,} registers and things, this one {len(changed):,}"
+            )
+            hint = "let several rules or entries change some of them each"
+            self._findings.error("S106", message, changed[MAX_CHANGES], hint=hint)
 
     def _grammar_is_whole(self) -> bool:
         """Whether it can be known what the agent can say; mistakes are reported."""
@@ -641,15 +672,20 @@ class _Run:
         return reward.term.value, None
 
     def _channels(self) -> int:
-        """How many channels the picture has: the first four, or two more; not those for what is carried and looks."""
+        """How many channels the picture has: the first four, two or four more; not carrying and looks."""
         given = self._scenario.observe.channels or CHANNELS[:4]
         known = (*CHANNELS, *self._scenario.looks)
-        plain = tuple(name for name in given if name in CHANNELS[:6])
-        if plain not in (CHANNELS[:4], CHANNELS[:6]) or given != tuple(n for n in known if n in given):
+        plain = tuple(name for name in given if name in CHANNELS[:8])
+        if plain not in (CHANNELS[:4], CHANNELS[:6], CHANNELS[:8]) or given != tuple(
+            n for n in known if n in given
+        ):
             more = f", then {', '.join(self._scenario.looks)}" if self._scenario.looks else ""
-            message = f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, and carrying{more}"
+            message = (
+                f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, "
+                f"pointing_right and pointing_ahead, and carrying{more}"
+            )
             self._findings.error("S106", message, self._findings.places.key_span(("observe", "channels")))
-        return 4 if plain == CHANNELS[:4] else 6
+        return len(plain)
 
     def _shows_carrying(self) -> bool:
         """Whether the picture has a channel for what NPCs carry; by default where something can be carried."""

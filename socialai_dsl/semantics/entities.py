@@ -65,7 +65,9 @@ AGENT = "agent"
 _OF_LAYOUTS = frozenset({"let", "last", "heard", "pending", "memory", "member", "one_of", "state"})
 """Keys of layouts and descriptions beside the names of objects and members of the cast."""
 
-_TAKEN = frozenset({"name", "kind", "index", "cell", "frame", "clock"})
+_ATTRIBUTES = frozenset({"name", "kind", "index", "cell"})
+"""What things and members of the cast have already, so that no look and no register of the world may be called so."""
+_TAKEN = _ATTRIBUTES | {"frame", "clock"}
 """What a member of the cast has already, so that no slot or register of its frame may be called so."""
 
 
@@ -203,7 +205,7 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
     taken: dict[str, str] = {}
     for kind, path, name in _names(scenario):
         span = findings.places.key_span(path)
-        if name in WORDS and name != AGENT:
+        if (name in WORDS and name != AGENT) or (name in _ATTRIBUTES and path[0] in ("state", "looks")):
             message = f"`{name}` is a word of the language; call the {kind} something else"
             findings.error("S213", message, span)
         elif name in _OF_LAYOUTS and path[0] in ("objects", "cast"):

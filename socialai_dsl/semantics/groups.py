@@ -193,6 +193,18 @@ def opened(expected: Type | None) -> Type | None:
 
 def _weighted(resolver: Resolver, option: ast.Expr, scope: Scope) -> tuple[int, ast.Expr]:
     match option:
+        case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=ast.Number(value=value)):
+            total = weight * value
+            message = f"`{quoted(option)}` is the number {total} here, not {value} with a weight"
+            often = " | ".join([str(value)] * weight) if weight in range(1, 7) else f"{value} | {value} | ..."
+            hint = f"for {value} with the weight {weight} write `{often}`, for {total} write `{total}`"
+            raise resolver.fail("S203", message, option, scope, hint=hint)
+        case ast.Interval(
+            low=ast.Arithmetic(op="*", left=ast.Number(), right=ast.Number()) as low, high=high
+        ):
+            each = f"{quoted(low.left)} * ({quoted(low.right)}..{quoted(high)})"
+            message = f"`{quoted(option)}` begins at `{quoted(low)}`, and has no weight"
+            raise resolver.fail("S203", message, option, scope, hint=f"for each with a weight write `{each}`")
         case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=right) if not isinstance(
             right, ast.Number
         ):

@@ -468,7 +468,7 @@ class CheckedScenario:
         require: a room is drawn again while one of these is false.
         egocentric: the picture shows the directions of NPCs relative to the agent's.
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
-        each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6; one
+        each_step: millionths added to the reward of every step. channels: of the picture, 4, 6 or 8; one
             more where it `shows_carrying`.
         properties: what the scenario claims about itself; probes: what language models are asked. No program of the
             scenario contains either.

@@ -37,8 +37,10 @@ from socialai_dsl.semantics.signatures import (
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
+    CELL,
     DIRECTION,
     TURN,
+    CellOf,
     Compare,
     Const,
     FieldOf,
@@ -292,8 +294,11 @@ def _points_at(subject: Term, other: Term) -> Term:
     way = arithmetic(
         "+", replace(Measure(DIRECTION, "dir_to", (subject, other)), type=Type("int", 0, 3)), number(1)
     )
-    straight = (Test("in_line", subject, other), Not(Test("at", subject, other)))
-    return all_of([Compare("==", FieldOf(ways, subject, "pointing"), way), *straight])
+    straight = all_of(
+        [Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)]
+    )
+    at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
+    return all_of([any_of([at_it, straight]), Not(Test("at", subject, other))])
 
 
 def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
@@ -615,7 +620,10 @@ def _both_hold(left: Term, right: Term) -> Term:
     empty = [side for side in (left, right) if may_be_nothing(side)]
     if not empty or (left.type.kind != "int" and not all(_is_unlike(side) for side in (left, right))):
         return alike
-    return all_of([*(_negated(holds_nothing(side)) for side in empty), alike])
+    # What makes the whole condition false is asked for first, as an empty register does not ask for the other side.
+    asked = [side for side in (left, right) if side is not empty[0] and _has_to_be_there(side)]
+    there = (Compare("==", side, side) for side in asked)
+    return all_of([*there, *(_negated(holds_nothing(side)) for side in empty), alike])
 
 
 def _has_to_be_there(term: Term) -> bool:

@@ -96,7 +96,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("faces_toward", "entity", ("entities",), "condition", "turned to where face(x) would end"),
     _value("joint_attention", "member", ("entity", "entities"), "condition", "both look at x, or at the same object",
            optional=1),
-    _value("points_at", "member", ("entities",), "condition", "it points, and x lies straight that way"),
+    _value("points_at", "member", ("entities",), "condition", "it points at the cell of x, or the way x lies straight"),
     _value("toggled_by", "object", ("entity",), "condition", "this one toggled at it in this step", momentary=True),
     _value("eye_contact", "entity", ("entities",), "condition", "same row or column, each turned to the other"),
     _value("in_line", "entity", ("entities",), "condition", "same row or same column"),
@@ -182,6 +182,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _activity("enter", ("entity",), "open x if it is closed, then go in"),
     _activity("push", ("entity", "direction"), "go behind x and push it that way"),
     _activity("point", ("entity",), "point the way x lies", moves="stays"),
+    _activity("point_at", ("entity",), "point at the cell of x, in any direction", moves="stays"),
     _activity("stop_pointing", (), "take the arm down", moves="stays"),
     _activity("follow", ("entity",), "walk next to x, again and again", endless=True),
     _activity("stay_near", ("entity", "int"), "walk towards x while it is more than n cells away", endless=True),
@@ -217,6 +218,7 @@ SYNONYMS: Final = {
     "hand": "give", "hand_over": "give", "put_down": "drop", "lay_down": "drop", "go_through": "enter",
     "rotate": "turn", "look_for": "search", "find": "search", "explore": "search", "seek": "search",
     "look_around": "search", "exit": "enter", "dance": "perform", "repeat": "perform",
+    "points_at": "point_at", "point_to": "point_at",
 }  # fmt: skip
 """What authors write for an activity -> what it is called here."""
 

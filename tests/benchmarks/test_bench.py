@@ -47,9 +47,16 @@ def test_walk_leaves_out_what_ends_the_scenario(scenario: str) -> None:
     assert said == {"Please open the door", "Please open the weather", "How is the door"}
 
 
+def test_walk_stands_still_where_every_action_ends_the_scenario(scenario: str) -> None:
+    text = Path(scenario).read_text(encoding="utf-8")
+    Path(scenario).write_text(text + "  - failure: agent.x > 0\n", encoding="utf-8")
+    allowed = Allowed(scenario)
+    assert allowed.primitives.tolist() == [len(socialai_dsl.compile(socialai_dsl.load(scenario)).actions)]
+
+
 def test_actions_are_in_the_space_and_differ_from_step_to_step(scenario: str) -> None:
     envs = socialai_dsl.make_vec(scenario, num_envs=8)
-    for actions in (random_actions(envs, 1), walk_actions(envs, Allowed(scenario), 1)):
+    for actions in (random_actions(envs, 1), walk_actions(8, Allowed(scenario), 1)):
         assert all(envs.action_space.contains(batch) for batch in actions)
         assert not np.array_equal(actions[0], actions[1])
     envs.close()
@@ -200,6 +207,14 @@ def test_actions_are_translated_by_spelling(scenario: str) -> None:
     assert none[0] == len(envs.program.actions), "no movement is the last"
     assert envs.program.templates[forward[2]] == own.templates[1]
     assert envs.program.nouns[forward[3]] == own.nouns[1]
+
+
+def test_scenarios_with_other_slots_in_one_batch() -> None:
+    """Grammars with one slot, with three, and with one of another name."""
+    names = ["talkitout", "novel/reference_game", "novel/gossip"]
+    row = Ours([7], ["walk"], 1, 0.02).together(names, "walk")
+    assert (row.what, row.batch) == ("3 scenarios mixed", 7)
+    assert row.speed.cpu > 0
 
 
 def test_programs_alone_and_together(scenario: str) -> None:

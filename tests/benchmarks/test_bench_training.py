@@ -59,6 +59,7 @@ def test_updates_are_repeated_but_not_without_end() -> None:
     assert 1 <= report.rows[0].updates <= 3
 
 
+@pytest.mark.thorough("measures training")
 def test_the_report_is_json(capsys: Capture) -> None:
     command = ["--train", "--only", "fast", "--seconds", "0.01", "--repeat", "1", "--json"]
     assert main(command) == 0
@@ -72,6 +73,7 @@ def test_the_report_is_json(capsys: Capture) -> None:
     assert "torch" in report["versions"]
 
 
+@pytest.mark.thorough("measures training")
 def test_duplicates_are_counted_and_kept_if_asked() -> None:
     config = configure(net="paper", envs=4, horizon=20, minibatches=1)
     frames = config.frames_per_update * config.epochs

@@ -75,6 +75,7 @@ def actions(rng: np.random.Generator) -> np.ndarray:
     return plan
 
 
+@pytest.mark.thorough("compiles what has TalkItOut hard-coded")
 @pytest.mark.parametrize("make", MAKERS)
 def test_the_same_happens_in_the_same_rooms(engine: Any, make: Make) -> None:
     rng = np.random.default_rng(0)

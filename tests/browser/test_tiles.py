@@ -57,6 +57,12 @@ def all_tiles() -> list[Tile]:
         for pointing in (-1, 0, 1, 2, 3)
         for act in LAST_ACTS
     ]
+    rays = (
+        [[(0, 0), (3, -1), 0, 4]],
+        [[(-2, 1), (0, 0), 3, 1], [(0, 3), (0, 0), 3, 2]],
+        [[(-1, 2), (3, -2), 3, 5]],
+    )
+    found += [((tiles.EMPTY, 0, 0, 0), {"rays": ray}) for ray in rays]
     found += [
         ((tiles.NPC, 4, 1, 0), {"held": (code, colour, 0, 0)}) for code, _ in types for colour in range(6)
     ]
@@ -98,7 +104,8 @@ def as_png(look: tiles.Code, more: dict[str, Any]) -> np.ndarray:
     held = more.get("held")
     marks = tuple(Mark(*mark) for mark in more.get("marks", ()))
     seen = more.get("seen", False)
-    return draw_tile(look, more.get("agent"), seen, SIZE, more.get("below"), gesture, held, marks)
+    rays = tuple((*ray[:3], tiles.PALETTE[ray[3]]) for ray in more.get("rays", ()))
+    return draw_tile(look, more.get("agent"), seen, SIZE, more.get("below"), gesture, held, marks, rays)
 
 
 def pixels(address: str) -> np.ndarray:

@@ -29,7 +29,7 @@ SEARCH_ORDER = ("down", "up", "right", "left")
 
 def act(world: World, body: Entity, primitive: str) -> None:
     """Executes a primitive; what cannot be done is not done. `done` changes nothing in the room."""
-    # A body action with a direction: `point up`.
+    # A body action with a direction, `point up`, or with a cell, `point 3 4`.
     word, _, way = primitive.partition(" ")
     body.action = body.last_act = word
     if body.cell is None:
@@ -43,7 +43,7 @@ def act(world: World, body: Entity, primitive: str) -> None:
         body.bumped = True
         motion.push(world, ahead, body.facing)
     elif word == "point":
-        body.pointing = way
+        body.pointing = way if way.isalpha() else tuple(map(int, way.split()))  # type: ignore[assignment]
     elif word == "stop_pointing":
         body.pointing = None
     elif primitive == "toggle":
@@ -170,6 +170,7 @@ class Activity:
         return {
             "face": face,
             "point": point,
+            "point_at": point_at,
             "follow": go_next_to,
             "stay_near": go_next_to,
             "flee": flee,
@@ -330,6 +331,11 @@ def use(world: World, me: Entity, goal: Any) -> str:
 def point(world: World, me: Entity, goal: Any) -> str:
     """Points in the direction of the quadrant in which x lies."""
     return f"point {quadrant(where(me), where(goal))}"  # type: ignore[arg-type]
+
+
+def point_at(world: World, me: Entity, goal: Any) -> str:
+    """Points at the cell of x."""
+    return "point {} {}".format(*where(goal))  # type: ignore[misc]
 
 
 def flee(world: World, me: Entity, goal: Any) -> str:

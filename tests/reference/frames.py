@@ -36,6 +36,7 @@ class Turn:
     say: str | None = None  # one utterance per turn: the first is kept
     filled: dict[str, Any] | None = None  # of a performed utterance
     to: Entity | None = None  # who is addressed
+    tone: str | None = None  # that of the moment at which it is said
 
 
 class FrameRunner:
@@ -107,6 +108,7 @@ class FrameRunner:
         """The first thing that is said in a turn counts. That an NPC said it is known at once; it is heard later."""
         if turn.say is None:
             turn.say, turn.filled, turn.to = text, filled, to
+            turn.tone = None if self.world.tone is None else self.me.looks.get(self.world.tone)
             if self.me.sort == "npc":
                 self.me.utterance = text
 

@@ -129,8 +129,9 @@ def joint_attention(world: World, a: Any, b: Any, x: Any = None) -> bool:
 
 @_some
 def points_at(world: World, a: Any, x: Any) -> bool:
-    """x lies straight in the direction in which a points."""
-    return in_line(world, a, x) and where(a) != where(x) and a.pointing == quadrant(where(a), where(x))  # type: ignore[arg-type]
+    """x lies straight in the direction in which a points, or in the cell at which it points."""
+    straight = in_line(world, a, x) and a.pointing == quadrant(where(a), where(x))  # type: ignore[arg-type]
+    return where(a) != where(x) and (straight or a.pointing == where(x))
 
 
 def distance(world: World, a: Any, x: Any) -> int:

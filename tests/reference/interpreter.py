@@ -94,7 +94,9 @@ class Reference:
             overheard=scenario.overheard,
             egocentric=scenario.observe.directions == "egocentric",
             occlusion=scenario.room.occlusion,
-            gestures="pointing" in (scenario.observe.channels or ()),
+            gestures=sum(
+                "pointing" in name or name == "last_act" for name in scenario.observe.channels or ()
+            ),
             hands=self.shows_hands(),
             look_names=frozenset(scenario.looks),
             tone=scenario.observe.tone,
@@ -282,7 +284,7 @@ class Reference:
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
         if turn.say is not None:
-            speech.speak(self.world, npc, turn.say, turn.filled, turn.to)
+            speech.speak(self.world, npc, turn.say, turn.filled, turn.to, turn.tone)
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""

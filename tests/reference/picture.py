@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.reference.sight import cell_in_view, lit
-from tests.reference.world import COLORS, DIRECTIONS, TYPES, Cell, Entity, World
+from tests.reference.world import COLORS, DIRECTIONS, TYPES, Cell, Entity, World, quadrant
 
 SIZE = 7
 UNSEEN = (0, 0, 0, 0)
@@ -19,9 +19,9 @@ NOWHERE = (-1000, -1000)
 
 def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
     """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4), with gestures
-    (7, 7, 6)."""
-    more = 2 * world.gestures + world.hands + len(world.shown_looks)
-    behind = 4 + 2 * world.gestures + world.hands
+    (7, 7, 6), with cells that are pointed at (7, 7, 8)."""
+    behind = 4 + world.gestures + world.hands
+    more = behind - 4 + len(world.shown_looks)
     image = np.full((SIZE, SIZE, 4 + more), NOTHING, dtype=np.uint8)
     agent = world.agent
     eye = agent.cell or NOWHERE
@@ -38,8 +38,7 @@ def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
                 image[i, j, behind:] = looks(world, carried)
             else:
                 image[i, j, :4] = shown(world, cell, canvas)
-                if world.gestures:
-                    image[i, j, 4:6] = gestures(world, cell)
+                image[i, j, 4 : 4 + world.gestures] = gestures(world, cell)[: world.gestures]
                 if world.hands:
                     image[i, j, behind - 1] = hands(world, cell)
                 image[i, j, behind:] = looks(world, npc_shown(world, cell) or world.object_at(cell))
@@ -64,16 +63,27 @@ def hands(world: World, cell: Cell) -> int:
     return NOTHING if thing is None else TYPES[thing.type].code + 32 * COLORS.index(str(thing.color))
 
 
-def gestures(world: World, cell: Cell) -> tuple[int, int]:
-    """Where an NPC in the cell points, and its last act."""
+def gestures(world: World, cell: Cell) -> tuple[int, int, int, int]:
+    """Where an NPC in the cell points, its last act, and how far to the right and ahead of it the cell lies that it
+    points at, from 128."""
     npc = npc_shown(world, cell)
     if npc is None:
-        return NOTHING, NOTHING
-    towards = NOTHING if npc.pointing is None else direction_shown(world, npc.pointing)
+        return NOTHING, NOTHING, NOTHING, NOTHING
+    direction, right, ahead = npc.pointing, NOTHING, NOTHING
+    if isinstance(direction, tuple):
+        right, ahead = (128 + cells for cells in right_and_ahead(world.agent.facing, cell, direction))
+        direction = quadrant(cell, direction)
+    towards = NOTHING if direction is None else direction_shown(world, direction)
     act = LAST_ACTS.get(npc.last_act, LAST_ACTS["none"])
     # Who was reset after pointing has taken its arm down.
     points = npc.last_act == "point" and npc.pointing is not None
-    return towards, act + towards if points else act
+    return towards, act + towards if points else act, right, ahead
+
+
+def right_and_ahead(facing: str, start: Cell, goal: Cell) -> tuple[int, int]:
+    """How many cells to the right of a cell, and ahead of it, another lies for one who looks that way."""
+    dx, dy = goal[0] - start[0], goal[1] - start[1]
+    return {"up": (dx, -dy), "right": (dy, dx), "down": (-dx, dy), "left": (-dy, -dx)}[facing]
 
 
 def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, int, int]:

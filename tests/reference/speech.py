@@ -96,8 +96,9 @@ def speak(
     text: str,
     filled: dict[str, Any] | None = None,
     to: Entity | None = None,
+    tone: str | None = None,
 ) -> None:
-    """Says something, perhaps to somebody: it reaches the members within earshot, and the agent's history."""
+    """Says something, perhaps to somebody: it reaches who is within earshot, the agent with its tone."""
     if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
@@ -112,15 +113,9 @@ def speak(
             continue
         hearer.inbox.append(Heard(speaker, text, filled or {}, to))
         if hearer is world.agent:
-            world.lines.append(replace(hearer.inbox[-1], text=toned(world, speaker, text)))
+            world.lines.append(replace(hearer.inbox[-1], text=text if tone is None else f"({tone}) {text}"))
     if speaker is world.agent and world.own_voice:
         world.lines.append(Heard(speaker, text, filled or {}, to))
-
-
-def toned(world: World, speaker: Entity, text: str) -> str:
-    """What the agent hears of an NPC: where tones are heard, with that of the speaker before it."""
-    tone = None if world.tone is None else speaker.looks.get(world.tone)
-    return text if tone is None else f"({tone}) {text}"
 
 
 def in_speaking_order(world: World, inbox: list[Heard]) -> list[Heard]:

@@ -175,7 +175,7 @@ class Entity:
     action: str = "none"  # in this step
     last_act: str = "none"  # of its last turn, as it is seen
     bumped: bool = False  # it went forward in this step and did not get there
-    pointing: str | None = None
+    pointing: str | Cell | None = None  # a direction, or a cell
     believes: dict[str, Any] = field(default_factory=dict)
     ages: dict[str, int] = field(default_factory=dict)  # of beliefs: turns without a source
     poked: bool = False
@@ -249,7 +249,7 @@ class World:
     overheard: bool = True  # whether others hear what is said to somebody
     egocentric: bool = False
     occlusion: bool = False
-    gestures: bool = False  # whether the picture shows them
+    gestures: int = 0  # how many channels of the picture show them
     hands: bool = False  # whether it shows what NPCs carry
     tone: str | None = None  # the look whose word is heard before what NPCs say
     look_names: frozenset[str] = frozenset()

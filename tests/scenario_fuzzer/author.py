@@ -168,7 +168,7 @@ class _Author:
             known.templates, known.slots = ["Take <num>"], {"num": words["num"]}
         known.says = (
             [*known.says, *SAYINGS, *(self.phrases.filled(t) for t in known.templates)]
-            if known.follows
+            if known.follows.keys() - {"agent"}
             else []
         )
         made = {"templates": list(known.templates), "slots": {slot: written[slot] for slot in known.slots}}
@@ -648,6 +648,7 @@ class _Author:
             made["directions"] = "egocentric"
         if self.often(0.25):
             made["channels"] = ["type", "color", "status", "orientation", "pointing", "last_act"]
+            made["channels"] += ["pointing_right", "pointing_ahead"] if self.often(0.6) else []
             if self.declared.carried and self.often(0.7):
                 made["channels"].append("carrying")
             made["channels"] += [look.name for look in self.declared.looks if self.often(0.6)]

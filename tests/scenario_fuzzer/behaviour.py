@@ -218,7 +218,7 @@ class Behaviour:
             ),
             lambda: f"stay_near({phrases.entity(where)}, {rng.randint(1, 4)})",
             lambda: f"turn_to({phrases.direction(where)})",
-            lambda: f"face({phrases.spot(where)})",
+            lambda: f"{rng.choice(('face', *(['point_at'] if points else [])))}({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",
             lambda: f"go_next_to({phrases.reachable(where)})",
             lambda: f"search({phrases.sought(where)})",

@@ -76,7 +76,7 @@ class Declared:
     things: list[Thing] = field(default_factory=list)
     members: list[str] = field(default_factory=list)  # NPCs that are no group
     groups: dict[str, int] = field(default_factory=dict)  # groups of NPCs
-    follows: dict[str, Frame] = field(default_factory=dict)  # NPC or group: its frame
+    follows: dict[str, Frame] = field(default_factory=dict)  # NPC, group or agent: its frame
     beliefs: dict[str, dict[str, str]] = field(default_factory=dict)  # member: belief: sort
     numbers: list[str] = field(default_factory=list)  # registers of the world and lets
     registers: list[str] = field(default_factory=list)  # those of them that rules can set

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import pytest
 
 import socialai_dsl as sd
+from tests.quick import one_in
 from tests.scenarios.playing import (
     FORWARD,
     NOVEL,
@@ -42,7 +43,7 @@ def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]
             return env.describe(), info, float(reward)
 
 
-@pytest.mark.parametrize("name", NOVEL)
+@pytest.mark.parametrize("name", one_in(4, NOVEL, "plays 300 rooms"))
 def test_the_rooms_can_be_solved(name: str) -> None:
     """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
     solved = sum(bool(played(f"novel/{name}+oracle", seed)[1]["success"]) for seed in range(300))

@@ -27,7 +27,7 @@ SCHOOL = tuple(
 ALL = [*PAPER, *(f"novel/{name}" for name in NOVEL), *SCHOOL]
 
 
-@pytest.mark.parametrize("name", one_in(4, ALL, "plays many rooms of every scenario"))
+@pytest.mark.parametrize("name", one_in(8, ALL, "plays many rooms of every scenario"))
 def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
     scripted = sd.load(f"{name}+oracle")
     assert isinstance(scripted, sd.LoadedScenario)

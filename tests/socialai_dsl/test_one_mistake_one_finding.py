@@ -14,6 +14,7 @@ from socialai_dsl.frontend import check
 from socialai_dsl.loader.library import shipped_folder
 from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.source import Source
+from tests.quick import one_in
 
 SCENARIOS = sorted(
     str(path.relative_to(shipped_folder()))
@@ -200,7 +201,12 @@ def test_one_mistake_anywhere_gives_one_error(scenarios: Path, kind: Callable[[s
 
 
 @pytest.mark.parametrize(
-    "name", ["talkitout", "help", "cointhief", "novel/haggling", "novel/turn_taking", "novel/culprit"]
+    "name",
+    one_in(
+        3,
+        ["talkitout", "help", "cointhief", "novel/haggling", "novel/turn_taking", "novel/culprit"],
+        "checks the file once for each line",
+    ),
 )
 def test_one_wrong_indentation_is_one_finding(name: str) -> None:
     """Every key of a file, with what belongs to it, one level too far left or right."""

@@ -12,7 +12,7 @@ def test_the_defaults_are_the_settings_that_worked() -> None:
     assert (config.envs, config.horizon, config.epochs, config.minibatches) == (256, 32, 4, 4)
     assert (config.lr, config.gamma, config.gae_lambda, config.clip) == (7e-4, 0.99, 0.95, 0.2)
     assert (config.entropy_coef, config.max_grad_norm, config.normalize_advantages) == (0.01, 0.5, True)
-    assert (config.precision, config.bootstrap_timeouts) == ("float32", True)
+    assert (config.precision, config.bootstrap_timeouts) == ("float32", False)
 
 
 # The paper's table of hyper-parameters, with what its released run scripts add.
@@ -67,9 +67,9 @@ def test_other_names_are_networks_with_the_default_numbers() -> None:
     assert set(NET_PRESETS) == {"paper-reference", "paper-reference-tuned"}
 
 
-@pytest.mark.parametrize("net", ["fast", "paper", *NET_PRESETS])
-def test_time_outs_are_terminal_for_the_paper_s_own_update_only(net: str) -> None:
-    assert configure(net=net).bootstrap_timeouts == (net not in NET_PRESETS)
+@pytest.mark.parametrize("recipe", ["plain", "paper"])
+def test_time_is_up_for_who_learns_from_the_reward_alone(recipe: str) -> None:
+    assert not configure(recipe).bootstrap_timeouts
 
 
 def test_a_recipe_brings_its_numbers_and_what_is_said_overrides_them() -> None:

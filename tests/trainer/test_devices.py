@@ -13,6 +13,7 @@ import torch
 from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.evaluation import evaluate
+from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
 from trainer.checkpoint import read
@@ -20,7 +21,7 @@ from trainer.play import CheckpointPolicy
 from trainer.ppo import train
 
 
-@pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
+@pytest.mark.parametrize("net", one_in(3, ["fast", "paper", "paper-reference"], "computes convolutions"))
 def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, small_config: Any) -> None:
     """It also does the same arithmetic as on the CPU, because the pretended card computes there."""
     settings = {

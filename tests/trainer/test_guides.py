@@ -187,6 +187,7 @@ def test_a_guided_run_stopped_and_resumed_ends_with_the_same_bits(tmp_path: Path
     assert rows[0] == rows[1]
 
 
+@pytest.mark.thorough("trains for seconds")
 def test_imitation_alone_teaches_what_the_script_does(tmp_path: Path) -> None:
     config = RunConfig(
         guide="script",

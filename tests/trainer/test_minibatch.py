@@ -7,6 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.config import RunConfig
@@ -77,7 +78,7 @@ def furthest(one: Tensor, other: Tensor) -> float:
 
 
 @pytest.mark.parametrize("distinct", [True, False], ids=["duplicates removed", "duplicates kept"])
-@pytest.mark.parametrize("net_name", ["fast", "paper"])
+@pytest.mark.parametrize("net_name", one_in(2, ["fast", "paper"], "computes convolutions"))
 def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> None:
     session, rollout, seen = play(net_name, distinct)
     net = session.actor.net

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.errors import ObservationError, TrainingStopped
@@ -68,7 +69,7 @@ def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
 
 
 @pytest.mark.parametrize("net", ["fast", "paper"])
-@pytest.mark.parametrize("length", [8, 40])
+@pytest.mark.parametrize("length", one_in(2, [8, 40], "computes convolutions"))
 def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, small_config: Any) -> None:
     """No sharing, no streaming: one frame at a time, histories from the first word, memory emptied at starts."""
     envs = Witness(8, length=length, chatter=0.5, limit=10, lethal=False)
@@ -95,7 +96,7 @@ def plain_features(model: Any, observation: dict[str, np.ndarray], e: int) -> to
 
 def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(small_config: Any) -> None:
     envs = Witness(8, limit=4)
-    config = small_config()
+    config = small_config(bootstrap_timeouts=True)
     session, rollout = play(config, envs)
     model, memory = session.actor.net, session.actor.net.memory.initial(8)
     checked = 0
@@ -111,7 +112,7 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
                 checked += 1
     assert checked > 0
     assert (rollout.bootstrap != 0).sum() == checked
-    _, terminal = play(small_config(bootstrap_timeouts=False), EchoEnvs(8, limit=4))
+    _, terminal = play(small_config(), EchoEnvs(8, limit=4))
     assert terminal.tally.timeouts > 0
     assert (terminal.bootstrap == 0).all()
 
@@ -122,7 +123,7 @@ def test_an_end_in_the_last_moment_beats_the_time_out(small_config: Any) -> None
             observation, reward, terminated, truncated, infos = super().step(actions)
             return observation, reward, terminated | truncated, terminated | truncated, infos
 
-    _, rollout = play(small_config(), Both(8, limit=4))
+    _, rollout = play(small_config(bootstrap_timeouts=True), Both(8, limit=4))
     assert rollout.ended.any()
     assert (rollout.bootstrap == 0).all()
     assert rollout.tally.timeouts == 0
@@ -130,7 +131,8 @@ def test_an_end_in_the_last_moment_beats_the_time_out(small_config: Any) -> None
 
 def test_batch_normalisation_counts_each_observation_once(small_config: Any) -> None:
     """Neither the value after a rollout's last step nor that of a time-out's last observation counts again."""
-    session, rollout = play(small_config(net="paper-reference"), EchoEnvs(8, limit=4), rollouts=2)
+    config = small_config(net="paper-reference", bootstrap_timeouts=True)
+    session, rollout = play(config, EchoEnvs(8, limit=4), rollouts=2)
     assert rollout.bootstrap.any()
     norms = [part for part in session.actor.net.modules() if isinstance(part, torch.nn.BatchNorm2d)]
     assert {int(norm.num_batches_tracked) for norm in norms} == {16}, "two rollouts of eight steps"

@@ -28,6 +28,7 @@ export function drawPicture(canvas, picture, { tile, letters = false }) {
       gesture: gestures.get(cell),
       held: held.get(cell),
       marks: marks.get(cell),
+      rays: raysAt(picture, x, y),
       letter: letters,
     });
   });
@@ -40,6 +41,16 @@ export function drawPicture(canvas, picture, { tile, letters = false }) {
     if (!seen(x + 1, y)) context.fillRect(left + tile - line, top, line, tile);
     if (!seen(x, y - 1)) context.fillRect(left, top, tile, line);
     if (!seen(x, y + 1)) context.fillRect(left, top + tile - line, tile, line);
+  });
+}
+
+/** The lines from NPCs to the cells that they point at, as far as they may come through a cell.
+ * @param {Picture} picture @param {number} x @param {number} y @returns {import("./tiles.js").Ray[]} */
+function raysAt({ width, cells, gestures }, x, y) {
+  return [...gestures].flatMap(([cell, { pointing, at }]) => {
+    if (!at?.length) return [];
+    const left = (cell % width) - x, up = Math.floor(cell / width) - y, right = left + at[0], down = up + at[1];
+    return left * right <= 0 && up * down <= 0 ? [[[left, up], [right, down], pointing, cells[cell][1]]] : [];
   });
 }
 

@@ -7,7 +7,10 @@
 /** @typedef {[number, number, number]} Rgb */
 /** @typedef {[number, number]} Point */
 /** @typedef {[number, number, number, number]} Look type, colour, status, orientation */
-/** @typedef {{pointing: number, act: string}} Gesture pointing -1: at nothing */
+/** @typedef {{pointing: number, act: string, at?: number[]}} Gesture pointing -1: at nothing; at: how far to the right
+ * and down the cell lies that is pointed at, empty if none is shown */
+/** @typedef {[Point, Point, number, number]} Ray from the cell of an NPC to the one that it points at, as columns to the
+ * right and rows down; the direction of its arm, the number of its colour */
 /** @typedef {[string, string, number, number]} Mark look, word, place of the word, row of the look */
 /** @typedef {(canvas: Pen, colour: Rgb, status: number, orientation: number) => void} Drawer */
 
@@ -168,7 +171,8 @@ class Pen {
  * @param {CanvasRenderingContext2D} context
  * @param {number} x left edge in pixels @param {number} y upper edge @param {number} size side
  * @param {Look} look
- * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, held?: Look, marks?: Mark[], letter?: boolean}} more
+ * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, held?: Look, marks?: Mark[], rays?: Ray[],
+ *   letter?: boolean}} more
  *   agent: its direction if it stands here; seen: tinted, since it is in the agent's field of view; below: what lies
  *   under an NPC; held: what it carries; marks: the looks of what is here, or of what the agent carries; letter: the
  *   first letter of the colour in a corner (e: grey)
@@ -189,6 +193,7 @@ export function drawTile(context, x, y, size, look, more = {}) {
   if (more.agent !== undefined) drawAgent(pen, more.agent);
   if (!isAgents) drawMarks(pen, marks);
   if (more.held) drawHeld(pen, more.held, isAgents ? marks : []);
+  drawRays(pen, more.rays ?? []);
   if (more.letter && !UNLETTERED.includes(look[0])) drawLetter(pen, look[1]);
   context.restore();
 }
@@ -504,6 +509,7 @@ const ARMS = [
   [[0.54, 0.85], [0.26, 0.85], [0.07, 0.85]],
   [[0.85, 0.62], [0.85, 0.26], [0.85, 0.07]],
 ];
+const RING = 0.42;
 
 /** An arm with a pointing hand, and in the upper left corner a sign for what an NPC did last.
  * @param {Pen} pen @param {Rgb} colour @param {number} orientation @param {Gesture} gesture */
@@ -521,6 +527,22 @@ function drawGesture(pen, colour, orientation, gesture) {
   if (!sign) return;
   pen.circle(0.2, 0.2, 0.19, { fill: sign.fill, outline: WHITE, width: 0.035 });
   sign.draw(pen);
+}
+
+/** The parts in a cell of lines from the fingers of NPCs to the cells that they point at, with a ring there.
+ * @param {Pen} pen @param {Ray[]} rays */
+function drawRays(pen, rays) {
+  for (const [[x, y], [toX, toY], direction, number] of rays) {
+    const finger = ARMS[direction][2], dark = mix(PALETTE[number % 6], INK, 0.3);
+    /** @type {Point} */ const start = [x + finger[0], y + finger[1]];
+    /** @type {Point} */ const goal = [toX + 0.5, toY + 0.5];
+    const share = Math.max(0, 1 - RING / Math.hypot(goal[0] - start[0], goal[1] - start[1]));
+    /** @type {Point} */ const end = [start[0] + (goal[0] - start[0]) * share, start[1] + (goal[1] - start[1]) * share];
+    pen.circle(...goal, RING + 0.02, { outline: WHITE, width: 0.11 });
+    pen.line([start, end], WHITE, 0.11);
+    pen.line([start, end], dark, 0.06);
+    pen.circle(...goal, RING, { outline: dark, width: 0.06 });
+  }
 }
 
 /** An arrow bent to the left (-1) or to the right (1). @param {number} side */

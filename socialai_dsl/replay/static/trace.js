@@ -9,6 +9,7 @@
 /** @typedef {{key: string, name: string, look: Look}} Member */
 /** @typedef {{name: string, success: boolean, text: string}} Outcome */
 /** @typedef {{probabilities: number[][], value?: number | null}} Thought */
+/** @typedef {[number, number, string, ...number[]]} TracedGesture */
 /**
  * @typedef {object} Moment
  * @property {number} t
@@ -18,10 +19,10 @@
  * @property {[number, number][]} [cells]
  * @property {[number, number, number]} agent
  * @property {[number, number][]} [below]
- * @property {[number, number, string][]} [gestures]
+ * @property {TracedGesture[]} [gestures]
  * @property {[number, number][]} [held]
  * @property {number[] | null} [view]
- * @property {[number, number, string][]} [view_gestures]
+ * @property {TracedGesture[]} [view_gestures]
  * @property {[number, number][]} [view_held]
  * @property {[number, number][]} [marks]
  * @property {[number, number][]} [view_marks]
@@ -129,8 +130,8 @@ export class Episode {
     const [width, height] = moment.room ?? [before.room.width, before.room.height];
     const cells = moment.room ? [] : [...before.room.cells];
     for (const [cell, look] of moment.cells ?? []) cells[cell] = this.looks[look];
-    const pairs = (/** @type {[number, number, string][]} */ found) =>
-      new Map(found.map(([cell, pointing, act]) => [cell, { pointing, act }]));
+    const pairs = (/** @type {TracedGesture[]} */ found) =>
+      new Map(found.map(([cell, pointing, act, ...at]) => [cell, { pointing, act, at }]));
     const looks = (/** @type {[number, number][]} */ found) => new Map(found.map(([cell, look]) => [cell, this.looks[look]]));
     const marks = (/** @type {[number, number][]} */ found) => new Map(found.map(([cell, one]) => [cell, this.marks[one]]));
     const changed = moment.state ?? {};

@@ -85,10 +85,12 @@ def test_what_nobody_can_do_is_never_solved(tmp_path: Path, doors: str) -> None:
     assert (found.success, found.undecided) == (0.0, 0)
 
 
+@pytest.mark.thorough("searches many rooms")
 def test_talkitout_leaves_a_guess_among_four_doors() -> None:
     assert alone("talkitout", 64).success == pytest.approx(0.25, abs=0.02)
 
 
+@pytest.mark.thorough("searches many rooms")
 def test_the_depth_of_a_scenario(tmp_path: Path) -> None:
     loaded = socialai_dsl.load("talkitout")
     scripted = socialai_dsl.load("talkitout+oracle")

@@ -35,6 +35,7 @@ def evaluated(capsys: Capture, *arguments: str) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.thorough("trains and evaluates")
 def test_the_other_role(help_run: Path, tmp_path: Path, capsys: Capture) -> None:
     out = tmp_path / "there"
     arguments = [str(help_run), "--on", "help_as_helper", "--episodes", "40", "--device", "cpu"]

@@ -47,6 +47,7 @@ def evaluated(capsys: Capture, *arguments: str) -> Any:
     return result
 
 
+@pytest.mark.thorough("evaluates and trains")
 def test_it_plays_elsewhere_as_it_did_here(
     place: Path, exported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.run import add_arguments
-from socialai_dsl.cli.run_options import new_config
+from socialai_dsl.cli.run_options import frames_for, new_config
 from socialai_dsl.errors import UsageError
 from trainer.config import RunConfig, configure
 
@@ -411,6 +411,17 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     assert "--frames: expected at least 0, got -1" in capsys.readouterr().err
     assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0
     assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
+
+
+def test_a_file_says_how_long_an_agent_is_guided() -> None:
+    for name, text in {
+        "short": "scenario: short\nextends: corridor.yaml\ntraining_frames: 4096\n",
+        "pair": "suite: pair\nabout: Two.\nmembers: [corridor.yaml, short.yaml]\ntraining_frames: 8192\n",
+    }.items():
+        Path(f"{name}.yaml").write_text(text)
+    budgets = {name: frames_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair")}
+    assert budgets == {"corridor": 2_000_000, "short": 4096, "pair": 8192}
+    assert frames_for("plain", "short.yaml") == 600_000
 
 
 @pytest.mark.thorough("trains twice")

@@ -123,6 +123,7 @@ def test_a_room_that_cannot_be_is_the_authors_affair(capsys: Capture) -> None:
         assert "bug" not in said
 
 
+@pytest.mark.thorough("trains twice")
 def test_a_run_with_a_curriculum_is_resumed_with_it(capsys: Capture) -> None:
     plan = "curriculum: mine\nphases:\n- play: [{only: {help: told}}]\n  until: {episodes: 99000}\n- {}\n"
     Path("plan.yaml").write_text(plan)

@@ -10,10 +10,12 @@ import pytest
 
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import (
+    BOARDS,
     CELL,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    TEMPORARIES,
     TEMPORARY,
     Body,
     EntityColumn,
@@ -137,6 +139,7 @@ SOUND: dict[str, tuple[Header, Code]] = {
     "a reward": (RULES, [(Op.REWARD, const(-100))]),
     "an end with a share": (RULES, [(Op.END_GRADED, 0, const(2000))]),
     "acceptance": (REQUIRE, [(Op.LOAD, Register.ACCEPTED, const(1))]),
+    "a mark that statuses are to be settled": (RULES, [(Op.LOAD, Register.CHANGED, const(1))]),
 }
 
 REFUSED: dict[str, tuple[Header, Code]] = {
@@ -180,9 +183,9 @@ REFUSED: dict[str, tuple[Header, Code]] = {
         RULES,
         [FILL, (*EACH, 1), (Op.B_FLOOR, 1), (Op.END_EACH,), (Op.B_COUNT, temp(5), 1)],
     ),
-    "a set of cells that does not exist": (RULES, [(Op.B_FLOOR, 8)]),
+    "a set of cells that does not exist": (RULES, [(Op.B_FLOOR, BOARDS)]),
     "a count in a register": (RULES, [FILL, (Op.B_COUNT, "n", 0)]),
-    "a cell in one temporary": (RULES, [FILL, (Op.FIRST_CELL, temp(63), 0)]),
+    "a cell in one temporary": (RULES, [FILL, (Op.FIRST_CELL, temp(TEMPORARIES - 1), 0)]),
     "the cell nearest to nobody": (RULES, [FILL, (Op.NEAREST_CELL, temp(0), 0, const(9))]),
     "the nearest of entities that do not exist": (RULES, [(Op.NEAREST, temp(0), const(0), 1 << 8 | 99)]),
     "the nearest of no entities": (RULES, [(Op.NEAREST, temp(0), const(0), 1 << 8)]),
@@ -201,7 +204,7 @@ REFUSED: dict[str, tuple[Header, Code]] = {
     ),
     "a loop with room for two coordinates": (
         RULES,
-        [FILL, (Op.EACH_CELL, 0, temp(62), 1), (Op.DROP_CELL,), (Op.END_EACH,)],
+        [FILL, (Op.EACH_CELL, 0, temp(TEMPORARIES - 2), 1), (Op.DROP_CELL,), (Op.END_EACH,)],
     ),
     "a way out of a loop": (
         RULES,
@@ -279,6 +282,7 @@ REFUSED: dict[str, tuple[Header, Code]] = {
     "a thing that points": (RULES, [(Op.POINT, const(3), const(0))]),
     "the agent points": (RULES, [(Op.POINT, const(0), const(0))]),
     "pointing nowhere": (RULES, [(Op.POINT, const(1), const(4))]),
+    "pointing off the canvas": (RULES, [(Op.POINT, const(1), const(CELL + 32 * 30))]),
     "facing what does not exist": (RULES, [(Op.FACE, const(1), const(99), 0)]),
     "nobody who faces": (RULES, [(Op.FACE, const(99), const(1), 0)]),
     "facing at no place": (RULES, [(Op.FACE, const(1), const(1), 1000)]),
@@ -293,6 +297,7 @@ REFUSED: dict[str, tuple[Header, Code]] = {
     "an end with a share that nobody knows": (RULES, [(Op.END_GRADED, 0, temp(9))]),
     "who said it where nobody notes it": (RULES, [(Op.HEARD_FROM, temp(0), "inbox", 0)]),
     "acceptance by a rule": (RULES, [(Op.LOAD, Register.ACCEPTED, const(1))]),
+    "a mark of something else": (RULES, [(Op.LOAD, Register.CHANGED, const(2))]),
     "acceptance by the reset": (RESET, [(Op.LOAD, Register.ACCEPTED, const(1))]),
     "a number written while a room is judged": (REQUIRE, [(Op.LOAD, "n", const(1))]),
     "time written by a rule": (RULES, [(Op.LOAD, Register.T, const(1))]),

@@ -277,14 +277,14 @@ def test_what_lies_in_something_can_appear() -> None:
     gone = FieldOf(BOOL, entity(APPLE), "gone")
     inside = changed(workshop(), CHEST, contains=(APPLE,))
     assert times(workshop(), gone) == [When.NEVER]
-    assert times(inside, gone) == [When.STATUSES]
+    assert times(inside, gone) == [When.MARKED]
 
 
 def test_a_line_of_sight_depends_on_what_moves_through_it() -> None:
     free = Relation("unobstructed", entity(LEVER), cell(1, 5))
     assert times(workshop(), free) == [When.ANY_TIME]
     still = changed(workshop(), MARBLE, type=workshop().entities[APPLE].type)
-    assert times(still, free) == [When.STATUSES]
+    assert times(still, free) == [When.MARKED]
 
 
 def test_views_depend_on_statuses_where_things_hide_others() -> None:
@@ -292,7 +292,7 @@ def test_views_depend_on_statuses_where_things_hide_others() -> None:
     seen = Sees(entity(GUIDE), entity(APPLE), Const(DIRECTION, 1))
     hidden = replace(still, room=replace(still.room, occlusion=True))
     assert times(still, seen) == [When.NEVER]
-    assert times(hidden, seen) == [When.STATUSES]
+    assert times(hidden, seen) == [When.MARKED]
     assert compiled(hidden).header(Header.FLAGS) & Flag.OCCLUSION
 
 

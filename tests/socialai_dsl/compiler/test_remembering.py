@@ -9,6 +9,7 @@ from socialai_dsl.program import Header
 from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Drawn, Effect, MemoryPlan, RulePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
+    BOOL,
     CELL,
     CellOf,
     Chance,
@@ -222,6 +223,13 @@ def test_registers_of_a_memory() -> None:
     ]
     always = [name.path for name in compiled(acting()).registers]
     assert "memory.acts.open" not in always
+
+
+def test_what_never_holds_is_not_remembered_anew() -> None:
+    """Its register is 0 from the reset on."""
+    checked = remembering(Const(BOOL, 0), BOOL, Compare("==", Read(BOOL, "prev.0"), Const(BOOL, 0)))
+    assert compiled(checked).header(Header.BEFORE_PC) == 0
+    assert played(checked, "left", "left") == [1, 2]
 
 
 def test_what_is_not_needed_costs_nothing() -> None:

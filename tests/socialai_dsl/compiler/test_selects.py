@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from socialai_dsl.compiler.folding import Classes, Facts, fold
@@ -12,9 +14,11 @@ from socialai_dsl.semantics.terms import (
     Logic,
     Not,
     Operation,
+    Quantified,
     Select,
     Term,
     Type,
+    Variable,
     World,
 )
 from tests.socialai_dsl.compiler.workbench import (
@@ -96,6 +100,33 @@ def test_what_is_known_is_decided_before() -> None:
     assert fold(known, Facts(), classes) == Select(NUMBER, (is_(2),), (number(2),), number(3))
     assert fold(Select(NUMBER, (TRUE,), (number(1),), number(5)), Facts(), classes) == number(1)
     assert fold(select(5, 5, default=5), Facts(), classes) == number(5)
+
+
+def test_arithmetic_of_known_numbers_is_known() -> None:
+    classes = Classes(workbench())
+
+    def folded(op: Any, *args: int) -> Term:
+        return fold(Operation(NUMBER, op, tuple(map(number, args))), Facts(), classes)
+
+    known = {"+": 13, "-": 7, "*": 30, "//": 3, "%": 1, "min": 3, "max": 10}
+    assert {op: folded(op, 10, 3) for op in known} == {op: number(value) for op, value in known.items()}
+    assert (folded("//", -7, 2), folded("%", -7, 2)) == (number(-4), number(1)), "rounded down"
+    assert (folded("//", 7, 0), folded("%", 7, 0)) == (number(0), number(0)), "as the engine divides"
+    assert folded("+", 1, 2, 3) == number(6)
+    assert isinstance(folded("*", 100, 100), Operation), "its type would cut it"
+
+
+def test_what_a_group_makes_known_is_decided_for_each_of_it() -> None:
+    """A table of what is known of each: 0, 1 and 4 of 2, 3 and 4."""
+    place = Operation(NUMBER, "-", (Variable(NUMBER, "n"), number(2)))
+    shares = Select(
+        NUMBER, (Compare("==", place, number(1)),), (number(1),), Operation(NUMBER, "*", (place, place))
+    )
+    condition = Compare("==", DIE, shares)
+    group = Quantified(BOOL, "any", "n", tuple(map(number, (2, 3, 4))), condition)
+    expected = Logic("or", tuple(Compare("==", DIE, number(n)) for n in (0, 1, 4)))
+    assert fold(group, Facts(), Classes(workbench())) == expected
+    assert die(group) == [True, True, False, False]
 
 
 def test_choices_are_short() -> None:

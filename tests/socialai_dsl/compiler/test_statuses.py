@@ -165,6 +165,35 @@ def test_one_pass_in_the_order_given() -> None:
     assert [thing["state"] for thing in env.describe()["switches"]] == ["pressed", "pressed"]
 
 
+def test_what_rules_set_is_looked_at_when_they_set_it() -> None:
+    """The door is locked while the die shows 2, which one rule lets it show and the next one ends."""
+    checked = computed(Compare("==", DIE, number(2)))
+    rules = tuple(
+        replace(
+            law(when=Compare("==", World(NUMBER, "t"), number(t))),
+            name=f"law{t}",
+            site=f"rules[{t}]",
+            sets=(Assignment("let.die", sited(number(value))),),
+        )
+        for t, value in ((2, 2), (4, 3))
+    )
+    checked = replace(checked, rules=rules)
+    assert not settles_always(checked)
+    assert code(compiled(checked), "rules").count("LOAD") == 2 * 3, "of the value, of the die and of the mark"
+    env = start(checked, {"let": {"die": 1}})
+    seen = [door(env)]
+    for _ in range(4):
+        step(env)
+        seen.append(door(env))
+    assert seen == ["closed", "closed", "locked", "locked", "closed"]
+
+
+def test_rules_mark_nothing_that_no_status_reads() -> None:
+    rule = replace(law(), sets=(Assignment("let.die", sited(number(2))),))
+    checked = replace(computed(status(SWITCH, 1)), rules=(rule,))
+    assert code(compiled(checked), "rules").count("LOAD") == 2, "of the value and of the die"
+
+
 def test_what_the_agent_does_is_looked_at_all_the_time() -> None:
     checked = computed(Compare("<=", FieldOf(NUMBER, entity(AGENT), "x"), number(1)))
     assert settles_always(checked)
@@ -213,7 +242,7 @@ def any_cell(condition: Term) -> Quantified:
     return Quantified(BOOL, "any", "c", (), condition, cells=True)
 
 
-N, S, A = When.NEVER, When.STATUSES, When.ANY_TIME
+N, S, A = When.NEVER, When.MARKED, When.ANY_TIME
 OCCASIONS: list[tuple[Term, When]] = [
     (Compare("==", DIE, number(2)), N),
     (Compare("==", World(NUMBER, "width"), number(2)), N),
@@ -222,7 +251,8 @@ OCCASIONS: list[tuple[Term, When]] = [
     (PokedNow(entity(STATUE)), A),
     (Chance(0.5), A),
     (Read(NUMBER, "memory.acts.filled"), A),
-    (Read(NUMBER, "let.written"), A),
+    (Read(NUMBER, "let.written"), S),
+    (Read(NUMBER, "guide.frame"), A),
     (Read(NUMBER, "let.kept"), N),
     (FieldOf(COLOR, entity(AGENT), "color"), N),
     (FieldOf(NUMBER, entity(STATUE), "x"), N),

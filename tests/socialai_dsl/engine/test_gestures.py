@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.program import LAST_ACTS, NO_GESTURE, Body, Field, Flag, Op, Register
+from socialai_dsl.program import CELL, LAST_ACTS, NO_GESTURE, Body, Field, Flag, Op, Register
 from tests.assembly import (
     Assembly,
     FrameSpec,
@@ -23,9 +25,10 @@ NOTHING = [NO_GESTURE, NO_GESTURE]
 AHEAD = 3 * 7 + 5
 
 
-def shown(batch: Batch, cell: int = AHEAD) -> list[int]:
-    """Channels five and six of a cell of the picture, by default the one ahead."""
-    return batch.state.extra.view(np.uint8).reshape(-1, 49, 2)[0, cell].tolist()
+def shown(batch: Batch, cell: int = AHEAD, channels: int = 2) -> list[int]:
+    """The channels behind the fourth of a cell of the picture, by default the one ahead."""
+    held = batch.state.extra.view(np.uint8)[:, : 49 * channels]
+    return held.reshape(-1, 49, channels)[0, cell].tolist()
 
 
 def performing(*turns: Instruction, **more: object) -> Batch:
@@ -89,6 +92,43 @@ def test_directions_relative_to_the_agent(own: int) -> None:
     step(batch)
     relative = (1 - own + 2) % 4
     assert shown(batch) == [relative, LAST_ACTS["point"] + relative]
+
+
+@pytest.mark.parametrize("own", range(4))
+def test_cells_relative_to_the_agent(own: int) -> None:
+    """An NPC ahead points at a cell two to the right and one nearer, as the agent sees it; then it walks on."""
+    ahead, right = ((1, 0), (0, 1), (-1, 0), (0, -1))[own], ((0, 1), (-1, 0), (0, -1), (1, 0))[own]
+    npc = 4 + ahead[0], 4 + ahead[1]
+    cell = npc[0] + 2 * right[0] - ahead[0], npc[1] + 2 * right[1] - ahead[1]
+    batch = performing(
+        (Op.POINT, constant(1), constant(CELL + 32 * cell[1] + cell[0])),
+        (Op.BODY, constant(Body.FORWARD)),
+        at=((4, 4), npc),
+        facing=(own, own),
+        size=(9, 9),
+        canvas=(9, 9),
+        channels=8,
+    )
+    direction = (own + 1) % 4
+    step(batch)
+    assert shown(batch, channels=4) == [direction, LAST_ACTS["point"] + direction, 130, 127]
+    step(batch)
+    assert shown(batch, AHEAD - 1, channels=4) == [direction, LAST_ACTS["forward"], 130, 126]
+    assert shown(batch, channels=4) == 2 * NOTHING
+
+
+def test_a_direction_is_no_cell_and_a_program_shows_what_it_declares() -> None:
+    batch = performing((Op.POINT, constant(1), constant(3)), channels=8)
+    step(batch)
+    assert shown(batch, channels=4) == [3, LAST_ACTS["point"] + 3, *NOTHING]
+    activity = [(Op.POINT, constant(1), constant(CELL + 32 + 3))]
+    room: Any = {"at": ((1, 2), (2, 2)), "npcs": 1, "frames": (FrameSpec(1, (activity,)),)}
+    parts = [part_of(Assembly(channels=channels, **room).program()) for channels in (4, 6, 8)]
+    batch = Batch(parts, [[0], [1], [2]], [0, 1, 2], 8)
+    batch.reset()
+    step(batch)
+    rows = batch.state.extra.view(np.uint8)[:, : 4 * 49].reshape(3, 49, 4)[:, AHEAD].tolist()
+    assert rows == [2 * NOTHING, [3, 7, *NOTHING], [3, 7, 127, 129]]
 
 
 def test_nothing_is_shown_of_other_cells_or_hidden_npcs() -> None:

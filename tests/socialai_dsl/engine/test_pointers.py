@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from socialai_dsl.engine.jit import compiled
-from socialai_dsl.engine.pointers import Guarded, float64_of, int16_of, int64_of, make_book, uint32_of
+from socialai_dsl.engine.jit import compiled, inline
+from socialai_dsl.engine.pointers import Guarded, bare, float64_of, int16_of, int64_of, make_book, uint32_of
 from socialai_dsl.program import Field
 
 ROOT = Path(__file__).parents[3]
@@ -29,13 +30,21 @@ def mix_up(book: np.ndarray, row: int) -> int:
     return small[Field.X] + large[1]
 
 
-def test_rows_of_arrays_of_all_kinds() -> None:
+_mix_up = inline(mix_up)
+
+
+def mix_up_bare(book: np.ndarray, row: int) -> int:
+    return _mix_up(bare(book), row)
+
+
+@pytest.mark.parametrize("function", [mix_up, mix_up_bare])
+def test_rows_of_arrays_of_all_kinds(function: Callable[[np.ndarray, int], int]) -> None:
     small = np.arange(12, dtype=np.int16).reshape(3, 4)
     large = np.full((3, 2), 5, np.uint32)
     flat = np.zeros(6, np.int64)
     fraction = np.zeros(3)
     book = make_book([small, large, flat, fraction])
-    assert compiled(mix_up)(book, 2) == 8 + 0xFFFFFFFF, "an unsigned number is read as one"
+    assert compiled(function)(book, 2) == 8 + 0xFFFFFFFF, "an unsigned number is read as one"
     assert small[2].tolist() == [8, np.int64(70005).astype(np.int16), 10, 11]
     assert small[:2].ravel().tolist() == list(range(8))
     assert large.tolist() == [[5, 5], [5, 5], [5, 0xFFFFFFFF]]

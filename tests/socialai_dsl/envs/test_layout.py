@@ -250,14 +250,14 @@ def test_the_example_of_the_documentation() -> None:
 def test_gestures_beliefs_contents_and_registers_of_the_world_are_given_by_name() -> None:
     state = started(
         PLAYROOM,
-        peers=[{"at": [1, 1], "pointing": "left", "last": "point"}, {"at": [2, 2]}],
+        peers=[{"at": [1, 1], "pointing": "left", "last": "point"}, {"at": [2, 2], "pointing": [5, 4]}],
         child={"believes": {"where": "boxes[1]"}},
         toy={"inside": "boxes[1]"},
         lever={"state": "up", "timer": 2},
         state={"asked": 3},
         let={"peers[1].given": 2},
     )
-    assert state["peers"][0]["pointing"] == "left"
+    assert [peer["pointing"] for peer in state["peers"]] == ["left", [5, 4]]
     assert state["peers"][0]["last"] == "point"
     assert state["child"]["believes"] == {"where": "boxes[1]"}
     assert (state["toy"]["inside"], state["toy"]["gone"]) == ("boxes[1]", True)
@@ -279,6 +279,10 @@ def test_what_was_taken_out_of_something_lies_where_it_is_put() -> None:
         (
             {"peers": [{"pointing": "north"}]},
             r"peers\[0\].pointing: got 'north'; expected one of right, down",
+        ),
+        (
+            {"peers": [{"pointing": [9, 1]}]},
+            r"peers\[0\].pointing\[0\]: got 9; expected a number from 0 to 8",
         ),
         ({"peers": [{"last": "sing"}]}, r"peers\[0\].last: got 'sing'; expected one of left"),
         ({"child": {"believes": {"who": "toy"}}}, "child.believes: there is no 'who'; expected one of where"),

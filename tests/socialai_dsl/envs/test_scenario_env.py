@@ -9,6 +9,7 @@ from gymnasium.utils.env_checker import check_env
 
 import socialai_dsl as sd
 from socialai_dsl.envs import ScenarioEnv
+from tests.quick import one_in
 
 NAMES = [
     "talkitout",
@@ -21,7 +22,7 @@ NAMES = [
 # Warnings are errors in this suite, so the checker has to be content without a word.
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", one_in(4, NAMES, "draws many pictures"))
 def test_gymnasiums_checker(name: str) -> None:
     for render_mode in (None, "rgb_array", "ansi"):
         check_env(gymnasium.make("SocialAI/Scenario-v1", scenario=name, render_mode=render_mode).unwrapped)

@@ -19,9 +19,10 @@ from socialai_dsl.envs.picture import frame
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.play.game import Game
-from socialai_dsl.program import LAST_ACTS, VIEW, Flag, Header
+from socialai_dsl.program import GESTURES, LAST_ACTS, VIEW, Flag, Header
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.render.grid import draw_grid, figures
 from socialai_dsl.render.tiles import draw_tile
 from socialai_dsl.replay.film import record
 from socialai_dsl.replay.state import cast_of, played
@@ -38,7 +39,8 @@ OTHERS = sorted(
 CUES = [f"school/boxes+{cue}" for cue in ("color", "pointing", "feedback", "emulation", "scaffolding")]
 NAMES = [name for name in (*PAPER, *OTHERS, *CUES) if not name.endswith(("_as_coded", "_oracle"))]
 HANDS = Path(__file__).parents[2] / "data" / "hands"
-NAMES += [f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml", f"{HANDS.parent / 'looks'}.yaml"]
+AIMS = str(Path(__file__).parents[3] / "docs" / "cookbook" / "pointing_at_a_cell.yaml")
+NAMES += [AIMS, f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml", f"{HANDS.parent / 'looks'}.yaml"]
 STEPS, TILE, EDGE = 60, 32, 3
 _ROOM = 348
 """So many columns of a film show the room."""
@@ -88,12 +90,14 @@ def looks(env: ScenarioEnv, image: NDArray[np.uint8]) -> Iterator[tuple[int, int
     """Column, row and channels of each cell that the agent sees; its own shows what it carries."""
     _, (x, y, own) = env._table.cells(0)
     width, height = env._table.room(0)
+    # A cell that is pointed at is shown by a line across the room.
+    own_channels = [k for k, name in enumerate(env.channels) if name not in GESTURES[2:]]
     egocentric = bool(env.program.header(Header.FLAGS) & Flag.EGOCENTRIC)  # type: ignore[union-attr]
     dx, dy = FORWARD[own]
     for across, along in product(range(VIEW), repeat=2):
         ahead, right = VIEW - 1 - along, across - VIEW // 2
         column, row = x + ahead * dx - right * dy, y + ahead * dy + right * dx
-        look = tuple(image[across, along].tolist())
+        look = tuple(image[across, along, own_channels].tolist())
         own_cell = not (ahead or right)
         if own_cell and look[0] == tiles.EMPTY:
             continue
@@ -144,7 +148,7 @@ def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["talkitout", "school/boxes+pointing", "school/boxes+emulation", "school/marbles"]
+    "name", ["talkitout", "school/boxes+pointing", "school/boxes+emulation", "school/marbles", AIMS]
 )
 @pytest.mark.thorough("draws every step of many episodes")
 def test_films_show_what_pictures_show(name: str, tmp_path: Path) -> None:
@@ -201,6 +205,22 @@ def test_gestures_can_be_told_apart_at_a_glance() -> None:
         for i, one in enumerate(pictures):
             for other in pictures[:i]:
                 assert (np.abs(one - other).max(axis=2) > 60).sum() >= 10
+
+
+def test_every_cell_that_is_pointed_at_can_be_told_apart() -> None:
+    """In pictures and in words, from the middle of a room and from its corner, with the agent in the way."""
+    codes = np.zeros((7, 9, 4), np.uint8)
+    codes[..., 0] = tiles.EMPTY
+    for x, y in ((4, 3), (0, 6)):
+        room = codes.copy()
+        room[y, x] = tiles.NPC, 2, 0, 1
+        drawn: set[bytes] = set()
+        words: set[str] = set()
+        for column, row in product(range(9), range(7)):
+            gesture = Gesture(0, "none", (column - x, row - y))
+            drawn.add(draw_grid(room, (5, 3, 0), None, TILE, gestures={(x, y): gesture}).tobytes())
+            words.update(figures(room, {(x, y): gesture}))
+        assert len(drawn) == len(words) == 9 * 7
 
 
 def test_what_is_carried_can_be_told_apart() -> None:

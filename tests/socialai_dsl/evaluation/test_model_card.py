@@ -80,6 +80,7 @@ def test_its_code_plays_an_episode(card: str) -> None:
     assert printed.getvalue().strip() in result()["eval"]["outcomes"]
 
 
+@pytest.mark.thorough("trains twice")
 def test_its_command_trains_the_same_agent(card: str, tmp_path: Path) -> None:
     (command,) = re.findall(r"Trained again by `socialai-run ([^`]+)`", card)
     given = r"corridor\.yaml --recipe guided --frames 1500 --seed 3 --envs 32 --bonus lang"

@@ -13,6 +13,7 @@ from socialai_dsl.llm import TextView
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program import VIEW
 from socialai_dsl.vocabulary import COLORS, words
+from tests.quick import one_in
 
 STYLES = get_args(Style)
 STEPS = 40
@@ -75,7 +76,7 @@ def test_texts_differ_exactly_where_observations_do(name: str) -> None:
             )
 
 
-@pytest.mark.parametrize("name", PLAYED)
+@pytest.mark.parametrize("name", one_in(3, PLAYED, "plays every scenario in text"))
 def test_every_cell_that_is_not_empty_is_told_of_where_it_is(name: str) -> None:
     view = TextView(sd.compile(sd.load(name)), "json")
     for observation, info, _ in moments(name):
@@ -138,6 +139,22 @@ def test_gestures_are_told_of() -> None:
         "caretaker, looking towards you, pointing towards you, just began to point" in t for t in texts
     )
     assert any("cells out of sight" in text for text in texts)
+
+
+def test_cells_that_are_pointed_at_are_told_of() -> None:
+    name = str(Path(__file__).parents[3] / "docs" / "cookbook" / "pointing_at_a_cell.yaml")
+    layout: Any = {"agent": {"at": [4, 7], "facing": "up"}, "ann": {"at": [3, 5], "facing": "down"}}
+    env, view = sd.make(name), TextView(sd.compile(sd.load(name)))
+
+    def told(pointing: list[int]) -> str:
+        observation, info = env.reset(
+            seed=0, options={"layout": {**layout, "ann": {**layout["ann"], "pointing": pointing}}}
+        )
+        return view.observe(observation, info)
+
+    assert "pointing at the cell 4 steps beyond it and 2 steps to the left of it" in told([1, 1])
+    assert "pointing at the cell 1 step before it and 1 step to the right of it" in told([4, 6])
+    assert "pointing at the cell that it is on" in told([3, 5])
 
 
 @pytest.mark.parametrize("mode", ["text", "json", "tools"])

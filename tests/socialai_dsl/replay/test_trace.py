@@ -13,6 +13,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.replay import Thought, Trace, Tracer, trace_of, trace_schema
+from tests.quick import one_in
 from tests.tiny import Folder
 
 SCHEMA = Path(__file__).parents[3] / "docs" / "trace.schema.json"
@@ -70,7 +71,9 @@ def test_what_is_written_can_be_read() -> None:
     assert Trace.model_validate_json(trace.as_json()) == trace
 
 
-@pytest.mark.parametrize("scenario", ["talkitout+oracle", "cointhief+oracle", "social_env+oracle"])
+@pytest.mark.parametrize(
+    "scenario", one_in(3, ["talkitout+oracle", "cointhief+oracle", "social_env+oracle"], "plays step by step")
+)
 def test_moments_add_up_to_what_the_environment_shows(scenario: str) -> None:
     reset = {"options": {"test_episode": 4}}
     trace = traced(scenario, reset)

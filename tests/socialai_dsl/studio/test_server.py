@@ -185,6 +185,7 @@ def test_a_process_cannot_fill_the_machine() -> None:
     assert "MemoryError" in done.stderr
 
 
+@pytest.mark.thorough("starts a process")
 def test_ctrl_c_ends_it_without_a_word_and_no_module_of_the_folder_was_imported(tmp_path: Path) -> None:
     shutil.copy(SCENARIOS / "talkitout.yaml", tmp_path)
     for name in ("yaml", "multiprocessing", "socialai_dsl"):
