@@ -76,13 +76,13 @@ _beside: dict[Path, dict[str, ModuleType]] = {}
 
 def _load_file(file: Path) -> ModuleType:
     """Import a file, once for each content, so that equally named files of two folders do not meet."""
-    digest = hashlib.sha256(f"{file}\0".encode() + file.read_bytes()).hexdigest()
+    source = file.read_bytes()
+    digest = hashlib.sha256(f"{file}\0".encode() + source).hexdigest()
     unique = f"{file.stem}_{digest[:12]}"
     if unique in sys.modules:
         return sys.modules[unique]
     spec = importlib.util.spec_from_file_location(unique, file)
     assert spec is not None, "internal: a .py file has a spec"
-    assert spec.loader is not None, "internal: a .py file has a loader"
     module = importlib.util.module_from_spec(spec)
     sys.modules[unique] = module
     known = set(sys.modules)
@@ -90,7 +90,8 @@ def _load_file(file: Path) -> ModuleType:
     sys.modules.update(beside)
     sys.path.insert(0, str(file.parent))
     try:
-        spec.loader.exec_module(module)
+        # The loader would take a stored .pyc for the file if both the file's second and its length are the same.
+        exec(compile(source, file, "exec"), module.__dict__)
     except BaseException:
         del sys.modules[unique]
         raise
