@@ -96,6 +96,7 @@ def test_an_example_trains_and_resumes_exactly(
     capsys.readouterr()
 
 
+@pytest.mark.thorough("trains")
 def test_an_agent_with_a_network_of_ones_own_is_evaluated(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -52,6 +52,7 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     assert ["help / llm:qwen3-8b", "20", "20", "0.0%", "200", "40", "–"] in report.table("replies")
 
 
+@pytest.mark.thorough("plays many episodes in text")
 def test_the_command_about_probes_prints_such_a_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], update_goldens: bool
 ) -> None:

@@ -28,6 +28,7 @@ EFFORT = ("misspelt names among many", "places in rooms of many sizes")
 """All are compared with all, up to a fixed effort, which is beyond the sizes of the short test."""
 
 
+@pytest.mark.thorough("compiles large scenarios")
 @pytest.mark.parametrize(
     "name",
     one_in(

@@ -94,6 +94,7 @@ def play_within(folder: Path, seed: int, steps: int) -> int:
     return int((least != most).any(axis=0).sum())
 
 
+@pytest.mark.thorough("plays thirty random scenarios")
 def test_registers_stay_within_the_proven_intervals(tmp_path: Path) -> None:
     moved = [play_within(tmp_path, seed, steps=40) for seed in range(100_000, 100_030)]
     assert min(moved) > 1, "hardly anything happened"

@@ -64,6 +64,7 @@ def test_a_run_becomes_a_small_agent_with_a_card(agents: Path, capsys: pytest.Ca
     assert again["eval"] == result["eval"], "what is written down is what half precision reached"
 
 
+@pytest.mark.thorough("plays the test four times")
 def test_an_agent_is_shipped_again_under_another_program(agents: Path, tmp_path: Path) -> None:
     """As where the compiler gives the same scenario another program."""
     shutil.copytree(agents, tmp_path / "agents")

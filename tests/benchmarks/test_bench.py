@@ -209,6 +209,7 @@ def test_actions_are_translated_by_spelling(scenario: str) -> None:
     assert envs.program.nouns[forward[3]] == own.nouns[1]
 
 
+@pytest.mark.thorough("measures two scenarios")
 def test_scenarios_with_other_slots_in_one_batch() -> None:
     """Grammars with one slot, with three, and with one of another name."""
     names = ["talkitout", "novel/reference_game", "novel/gossip"]

@@ -110,6 +110,7 @@ def test_the_same_happens_in_the_same_rooms(engine: Any, make: Make) -> None:
     assert heard > 64, "some histories outgrew the room for them"
 
 
+@pytest.mark.thorough("compiles the limit")
 @pytest.mark.parametrize("make", MAKERS)
 def test_an_episode_that_ended_is_drawn_anew(make: Make) -> None:
     limit = make(3)

@@ -120,6 +120,7 @@ def test_json_has_the_same(gate: Path, capsys: Capture) -> None:
     assert (found["verdict"], found["held"], found["against"], found["file"]) == ("fails", 0, [0, 1], name)
 
 
+@pytest.mark.thorough("checks six scenarios")
 def test_every_member_of_a_suite_is_checked(capsys: Capture) -> None:
     assert main(["check", "social_env", "--rooms", "3"]) == 0
     named = [line.split(":")[0] for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]

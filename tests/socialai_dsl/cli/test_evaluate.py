@@ -71,6 +71,7 @@ def test_the_other_role(help_run: Path, tmp_path: Path, capsys: Capture) -> None
             assert 1 < film.n_frames <= int(rows[number]["length"]) + 1  # type: ignore[attr-defined]
 
 
+@pytest.mark.thorough("plays several evaluations")
 def test_seed_and_greedy(help_run: Path, capsys: Capture) -> None:
     def play(*more: str) -> Any:
         (result,) = evaluated(capsys, str(help_run), "--episodes", "20", *more)

@@ -121,6 +121,7 @@ def test_all_files_of_a_scenario_go_along(place: Path, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.thorough("trains, exports and plays")
 def test_a_network_of_ones_own_goes_along(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:

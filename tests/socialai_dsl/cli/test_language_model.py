@@ -17,6 +17,7 @@ from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
 from socialai_dsl.run_folder import scenario_folder_name
+from tests.quick import one_in
 from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
@@ -152,7 +153,7 @@ FAULTS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", one_in(4, FAULTS, "plays a command"))
 def test_what_passes_is_waited_for(fault: str, tmp_path: Path) -> None:
     count = 0
 
@@ -175,7 +176,7 @@ STALLS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("stall", STALLS)
+@pytest.mark.parametrize("stall", one_in(3, STALLS, "waits for time-outs"))
 def test_an_answer_that_takes_too_long_is_asked_for_again(stall: str, tmp_path: Path) -> None:
     with endpoint(lambda _: STALLS[stall]() if len(stub.requests) == 2 else "Act: done") as stub:
         assert evaluate(stub.url, tmp_path, "--timeout", "0.3", "--concurrency", "1") == 0
@@ -242,6 +243,7 @@ def test_a_failure_loses_nothing_and_the_same_command_goes_on(tmp_path: Path, ca
     assert figures(tmp_path)["eval"]["replies"] == 300
 
 
+@pytest.mark.thorough("several commands")
 def test_a_budget_is_kept_to_and_can_be_added_to(tmp_path: Path, capsys: Capture) -> None:
     with endpoint(lambda _: "Act: left") as stub:
         assert evaluate(stub.url, tmp_path, "--budget", "1_800", "--concurrency", "1") == 4
@@ -425,6 +427,7 @@ def probes_of(out: Path, scenario: str = BELIEF) -> Any:
     return figures(out, scenario)["eval"]["probes"]
 
 
+@pytest.mark.thorough("several commands")
 def test_the_truth_is_right_and_a_wrong_answer_is_not(tmp_path: Path, capsys: Capture) -> None:
     with endpoint(knowing(BELIEF, lambda question: f"Hm.\n**Answer: {question.right.upper()}**")) as stub:
         assert evaluate(stub.url, tmp_path / "right", *ALONE, on=BELIEF, episodes=2) == 0
@@ -457,6 +460,7 @@ def test_who_guesses_is_right_by_chance(tmp_path: Path) -> None:
         assert abs(score["right"] / 30 - chance) < 4 * (chance * (1 - chance) / 30) ** 0.5
 
 
+@pytest.mark.thorough("several commands")
 def test_questions_stay_apart_from_play_unless_they_are_kept(tmp_path: Path) -> None:
     requests = {}
     for probes in ("apart", "kept", "off"):
@@ -509,6 +513,7 @@ def test_other_probes_need_another_folder(tmp_path: Path, capsys: Capture) -> No
     assert "played with another probes" in capsys.readouterr().err
 
 
+@pytest.mark.thorough("several commands")
 def test_json_and_grammars_hold_answers_to_those_that_there_are(tmp_path: Path) -> None:
     with endpoint(lambda _: '{"move": "left", "say": null, "answer": "yes"}') as stub:
         assert evaluate(stub.url, tmp_path / "json", "--mode", "json", *ALONE, episodes=1) == 0
@@ -529,6 +534,7 @@ def test_scripts_are_not_asked(capsys: Capture) -> None:
     assert "probes" not in json.loads(capsys.readouterr().out)[0]["eval"]
 
 
+@pytest.mark.thorough("several commands")
 def test_a_replay_passes_questions_over(tmp_path: Path) -> None:
     with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as stub:
         assert evaluate(stub.url, tmp_path, *ALONE, on=BELIEF, episodes=1) == 0

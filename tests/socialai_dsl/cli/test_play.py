@@ -205,6 +205,7 @@ async def typed(pilot: Pilot[Any], text: str) -> None:
     await pilot.press(*("space" if c == " " else c for c in text), "enter")
 
 
+@pytest.mark.thorough("plays in a terminal")
 def test_keys_lists_and_lines() -> None:
     async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
         await pilot.press("up", "full_stop", "a", "space")
@@ -232,6 +233,7 @@ def test_keys_lists_and_lines() -> None:
     played("talkitout", play)
 
 
+@pytest.mark.thorough("plays in a terminal")
 def test_steps_are_taken_back_with_their_chance_and_played_again() -> None:
     async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
         def now() -> tuple[Any, ...]:

@@ -94,11 +94,13 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
     assert len(printed.splitlines()) < 20, "the table stays short"
 
 
+@pytest.mark.thorough("trains")
 def test_json_prints_the_result_and_nothing_else(capsys: Capture) -> None:
     assert run_main(["corridor.yaml", *QUICK, "--out", "here", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == result_of("here")
 
 
+@pytest.mark.thorough("trains")
 def test_a_run_says_no_to_another_scenario(trained: Path, capsys: Capture) -> None:
     shutil.copytree(trained, "here")
     assert run_main(["corridor.yaml", "--resume", "here"]) == 2

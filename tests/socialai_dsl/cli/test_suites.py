@@ -59,6 +59,7 @@ def test_the_scripts_of_a_suite(capsys: Capture) -> None:
     assert "the agent of errands has no frame" in capsys.readouterr().err
 
 
+@pytest.mark.thorough("compiles suites")
 def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
     async def keys(app: PlayApp) -> None:
         async with app.run_test() as pilot:

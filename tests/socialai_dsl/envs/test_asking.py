@@ -165,6 +165,7 @@ def test_where_a_value_finds_nothing_or_one_answer_is_left_nothing_is_asked(aske
     assert [(question.probe, question.right) for question in found] == [("false", "no")]
 
 
+@pytest.mark.thorough("compiles suites")
 def test_a_suite_asks_the_probes_of_the_member_that_is_played(tmp_path: Path) -> None:
     suite = tmp_path / "two.yaml"
     members = [str(SCENARIOS / "talkitout.yaml"), str(SCENARIOS / "help.yaml")]

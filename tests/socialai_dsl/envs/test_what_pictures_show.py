@@ -121,7 +121,7 @@ def test_pictures_of_cells_that_differ_for_the_agent_differ(name: str) -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", one_in(5, NAMES, "plays every scenario in three views"))
+@pytest.mark.parametrize("name", one_in(20, NAMES, "plays every scenario in three views"))
 def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
     """What `render` prints, what a trace shows, and what a player has on the screen."""
     game = Game(name)
