@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import importlib.util
 import sys
 from collections.abc import Sequence
 from inspect import isfunction
@@ -81,16 +80,14 @@ def _load_file(file: Path) -> ModuleType:
     unique = f"{file.stem}_{digest[:12]}"
     if unique in sys.modules:
         return sys.modules[unique]
-    spec = importlib.util.spec_from_file_location(unique, file)
-    assert spec is not None, "internal: a .py file has a spec"
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[unique] = module
+    module = sys.modules[unique] = ModuleType(unique)
+    module.__file__ = str(file)
     known = set(sys.modules)
     beside = _beside.setdefault(file.parent, {})
     sys.modules.update(beside)
     sys.path.insert(0, str(file.parent))
     try:
-        # The loader would take a stored .pyc for the file if both the file's second and its length are the same.
+        # Python's loader would take old bytecode for a file that was changed within a second and kept its length.
         exec(compile(source, file, "exec"), module.__dict__)
     except BaseException:
         del sys.modules[unique]
