@@ -81,8 +81,8 @@ class TrainingProgress:
         # The mean time of a frame, not the mean speed: a slow update counts for as long as it took.
         speed = len(self._speed) / sum(1 / max(s, 1e-9) for s in self._speed)
         left = max(self._total - frames, 0) / speed
-        known = f"{sum(self._success) / len(self._success):.3f}" if self._success else "-"
-        return f"{speed:>9,.0f} frames/s  success {known}  {_clock(left)} left"
+        success = f"  success {sum(self._success) / len(self._success):.3f}" if self._success else ""
+        return f"{speed:>9,.0f} frames/s{success}  {_clock(left)} left"
 
 
 def _clock(seconds: float) -> str:

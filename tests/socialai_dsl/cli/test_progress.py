@@ -40,7 +40,7 @@ def test_a_slow_update_counts_for_the_time_it_took(clock: Clock) -> None:
         shown.update(100, None, 100)
         clock.now = 10.0
         shown.update(200, None, 300)
-    assert stream.getvalue().split() == "200 of 9,200 frames 150 frames/s success - 1:00 left".split()
+    assert stream.getvalue().split() == "200 of 9,200 frames 150 frames/s 1:00 left".split()
 
 
 def test_updates_in_which_no_episode_ended_do_not_spoil_the_success(clock: Clock) -> None:
