@@ -1,5 +1,6 @@
 """`socialai experiment run`: works on an experiment's runs until all have ended."""
 
+import argparse
 import contextlib
 import json
 import signal
@@ -7,34 +8,88 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.experiment_document import asked_for, kept, threads, workers
+from socialai_dsl.cli.experiment_progress import RunsProgress
+from socialai_dsl.cli.experiment_tables import status_figures, status_text
+from socialai_dsl.errors import UsageError
+from socialai_dsl.experiments.document import differences
+from socialai_dsl.experiments.driver import drive
+from socialai_dsl.experiments.engines import Engine, MissingEngineError
+from socialai_dsl.experiments.engines.local import LocalEngine
+from socialai_dsl.experiments.engines.ray import RayEngine
+from socialai_dsl.experiments.engines.slurm import SlurmEngine
+from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, Run, runs_of
+from socialai_dsl.experiments.work import Outcome
 
-if TYPE_CHECKING:
-    from socialai_dsl.experiments.engines import Engine
-    from socialai_dsl.experiments.folder import Run
-    from socialai_dsl.experiments.work import Outcome
+
+def run(arguments: argparse.Namespace) -> Exit:
+    """Make the folder, or go on in it, and do the runs that are left."""
+    document, folder = asked_for(arguments)
+    if arguments.address is not None and arguments.engine != "ray":
+        raise UsageError("--address: only the engine `ray` has one")
+    if arguments.slurm and arguments.engine != "slurm":
+        raise UsageError("--slurm: only the engine `slurm` has jobs")
+    _prepare(folder, document, arguments)
+    engine = _engine(arguments, document, folder)
+    return work_on(folder, document, runs_of(folder, document), engine, arguments.json)
+
+
+def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespace) -> None:
+    """Make the experiment's folder, or see that it is one of the same experiment."""
+    if (folder / EXPERIMENT).exists():
+        changed = differences(kept(folder), document)
+        if changed and not arguments.update:
+            shown = changed[:10] + ([f"and {len(changed) - 10} more"] if len(changed) > 10 else [])
+            listed = "".join(f"\n  {line}" for line in shown)
+            raise UsageError(
+                f"{folder} is of another experiment or of an earlier state of this one:{listed}\n"
+                "Choose another --out; or let the folder follow with --update, which keeps the runs that are the same"
+            )
+    folder.mkdir(parents=True, exist_ok=True)
+    runs = folder / RUNS
+    if arguments.runs is not None and runs.resolve() != arguments.runs.resolve():
+        if runs.exists() or runs.is_symlink():
+            raise UsageError(f"--runs: {runs} exists already, so its runs stay there")
+        arguments.runs.mkdir(parents=True, exist_ok=True)
+        runs.symlink_to(arguments.runs.resolve(), target_is_directory=True)
+    runs.mkdir(exist_ok=True)
+    write_json(folder / EXPERIMENT, document)
+
+
+def _engine(arguments: argparse.Namespace, document: dict[str, Any], folder: Path) -> Engine:
+    cores = threads(document)
+    at_most = arguments.workers or workers(document)
+    try:
+        match arguments.engine:
+            case "ray":
+                return RayEngine(arguments.address, cores, at_most)
+            case "slurm":
+                # A cluster has more cores than this machine: all jobs at once, unless somebody says how many.
+                at_once = arguments.workers or len(document["runs"])
+                return SlurmEngine(folder, cores, at_once, dict(arguments.slurm or ()))
+    except (MissingEngineError, ValueError) as error:
+        raise UsageError(str(error)) from None
+    return LocalEngine(at_most)
 
 
 def work_on(
-    folder: Path, document: Mapping[str, Any], runs: "Sequence[Run]", engine: "Engine", as_json: bool
+    folder: Path, document: Mapping[str, Any], runs: Sequence[Run], engine: Engine, as_json: bool
 ) -> Exit:
     """Work on the runs that are left, and report their results.
 
     Raises:
         KeyboardInterrupt: somebody stopped it; all runs are left so that the same command goes on with them.
     """
-    from socialai_dsl.cli.experiment_progress import RunsProgress
-    from socialai_dsl.cli.experiment_tables import status_figures, status_text
-    from socialai_dsl.experiments.driver import drive
-
     outcomes: Counter[str] = Counter()
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if as_json else sys.stdout
     with _stopped_by_signals(), RunsProgress(runs, stream) as shown:
 
-        def ended(run: "Run", outcome: "Outcome", message: str) -> None:
+        def ended(run: Run, outcome: Outcome, message: str) -> None:
             outcomes[outcome.value] += 1
             shown.ended(run, outcome.value, message)
 

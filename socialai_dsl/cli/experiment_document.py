@@ -1,0 +1,72 @@
+"""What an experiment's file, name or folder says is run."""
+
+import os
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from socialai_dsl.checking.experiments import LoadedExperiment
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.errors import UsageError
+from socialai_dsl.experiments.document import document_of
+from socialai_dsl.experiments.folder import EXPERIMENT, UnreadableError, read_experiment
+from socialai_dsl.frontend import load_experiment
+from socialai_dsl.loader.library import looks_like_path, shipped_experiments
+
+
+def asked_for(arguments: Namespace) -> tuple[dict[str, Any], Path]:
+    """What is to be run, and the folder for it."""
+    given = Path(arguments.file)
+    if given.is_dir():
+        if arguments.out is not None or arguments.profile is not None:
+            raise UsageError(
+                f"{given} is a folder, which says itself what is run; --out and --profile are for files"
+            )
+        return kept(given), given
+    if not given.exists() and not looks_like_path(arguments.file):
+        shipped = shipped_experiments()
+        if arguments.file not in shipped:
+            near = did_you_mean(arguments.file, shipped)
+            hint = f"did you mean {near}?" if near else f"those that are shipped are {', '.join(shipped)}"
+            raise UsageError(f"there is no experiment {arguments.file!r}; {hint}")
+        given = shipped[arguments.file]
+    loaded = load_experiment(given)
+    profile = _profile(loaded, arguments.profile)
+    document = document_of(loaded, profile)
+    name = document["name"]
+    if profile is not None and profile != loaded.experiment.profile:
+        name += f"-{profile}"
+    return document, arguments.out or Path("runs") / "experiments" / name
+
+
+def _profile(loaded: LoadedExperiment, asked: str | None) -> str | None:
+    if asked is None:
+        return loaded.experiment.profile
+    if asked not in loaded.cells:
+        near = did_you_mean(asked, loaded.experiment.profiles)
+        listed = ", ".join(loaded.experiment.profiles) or "none"
+        hint = f"did you mean {near}?" if near else f"the file's profiles are {listed}"
+        raise UsageError(f"--profile: there is no {asked!r}; {hint}")
+    return asked
+
+
+def kept(folder: Path) -> dict[str, Any]:
+    """What an experiment's folder says is run."""
+    try:
+        document = read_experiment(folder)
+    except UnreadableError as error:
+        raise UsageError(str(error)) from None
+    if document is None:
+        raise UsageError(f"{folder} is no experiment's folder, it has no {EXPERIMENT}")
+    return document
+
+
+def threads(document: dict[str, Any]) -> int:
+    """The cores that a run needs, whichever it is."""
+    return max(int(condition["options"].get("threads", 1)) for condition in document["conditions"])
+
+
+def workers(document: dict[str, Any]) -> int:
+    """As many runs at once as this machine has cores for."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, cores // threads(document))

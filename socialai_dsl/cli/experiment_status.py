@@ -1,0 +1,71 @@
+"""`socialai experiment status`, `retry` and `cancel`: the runs of a folder, and wishes for them."""
+
+import argparse
+import json
+import sys
+
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.experiment_document import kept
+from socialai_dsl.cli.experiment_tables import status_figures, status_text
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.errors import UsageError
+from socialai_dsl.experiments import work
+from socialai_dsl.experiments.folder import Run, runs_of
+
+
+def status(arguments: argparse.Namespace) -> Exit:
+    """Print how far the runs are."""
+    document = kept(arguments.folder)
+    figures = status_figures(document, arguments.folder, runs_of(arguments.folder, document))
+    text = (
+        json.dumps(figures, indent=2, ensure_ascii=False)
+        if arguments.json
+        else status_text(figures, arguments.each)
+    )
+    print(text)
+    return Exit.GOOD
+
+
+def retry(arguments: argparse.Namespace) -> Exit:
+    """Let the next `run` repeat runs that failed or were cancelled."""
+    chosen = _chosen(arguments)
+    wanted = [run for run in chosen if run.shown_status().state in ("failed", "cancelled")]
+    return _tell(arguments, "waiting", wanted, {run.id for run in wanted if work.retry(run)})
+
+
+def cancel(arguments: argparse.Namespace) -> Exit:
+    """Give up runs that have not ended."""
+    wanted = [run for run in _chosen(arguments) if run.shown_status().state in ("waiting", "running")]
+    for run in wanted:
+        work.cancel(run)
+    return _tell(arguments, "cancelled", wanted, {run.id for run in wanted})
+
+
+def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed: set[str]) -> Exit:
+    """Say what became of wishes for runs."""
+    missed = [run for run in wanted if run.id not in changed]
+    if arguments.json:
+        print(json.dumps({state: sorted(changed), "busy": [run.id for run in missed]}, indent=2))
+    else:
+        print(f"{len(changed)} runs {state}" if len(changed) != 1 else f"1 run {state}")
+        for run in missed:
+            print(f"{run.label} ({run.id}): somebody works on it just now", file=sys.stderr)
+    return Exit.FINDINGS if missed else Exit.GOOD
+
+
+def _chosen(arguments: argparse.Namespace) -> list[Run]:
+    document = kept(arguments.folder)
+    runs = runs_of(arguments.folder, document)
+    if not arguments.runs:
+        return runs
+    names: dict[str, set[str]] = {}
+    for entry in document["runs"]:
+        names.setdefault(entry["condition"], set()).add(entry["id"])
+        names.setdefault(entry["id"], set()).add(entry["id"])
+    for word in arguments.runs:
+        if word not in names:
+            near = did_you_mean(word, names)
+            hint = f"; did you mean {near}?" if near else ""
+            raise UsageError(f"RUN: {arguments.folder} has no run and no condition {word!r}{hint}")
+    wanted = set().union(*(names[word] for word in arguments.runs))
+    return [run for run in runs if run.id in wanted]
