@@ -42,8 +42,8 @@ def joint_entropy(logits: Tensor, entropies: Tensor, sizes: tuple[int, ...], use
     """Entropy of the whole action in nats, (N,): H(body) + H(speak) + p(speak) (H(template) + sum of p(has s) H(s)).
 
     The heads are independent, and what a template lacks, and in silence all that would have been said, is no choice.
-    Logits are (N, A), entropies (N, H) of each head; p(has s) is the chance of a template that has the slot s. Both
-    chances have no gradient: it pays for talking, and who talks all the time does not learn to heed (docs/learning.md).
+    Logits are (N, A), entropies (N, H) of each head; p(has s) is the chance of a template that has the slot s.
+    Neither chance has a gradient: an agent that is paid for talking does not learn to heed answers (docs/learning.md).
     """
     _, speak, template, *_ = torch.split(logits.detach(), list(sizes), -1)
     chances = 1 if used is None else torch.softmax(template, -1) @ used.to(logits)  # (N, slots)

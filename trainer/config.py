@@ -258,7 +258,7 @@ RECIPES: Final[Mapping[str, Preset]] = {
     "guided": Preset(
         {
             "guide": "script",
-            "bootstrap_timeouts": True,  # as measured; after imitation hardly an episode runs out of time
+            "bootstrap_timeouts": True,  # as the shipped agents were trained; where waiting is learnt, it costs nothing
             "envs": 128,
             "horizon": 64,
             "minibatches": 16,

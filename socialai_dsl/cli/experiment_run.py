@@ -68,7 +68,7 @@ def _engine(arguments: argparse.Namespace, document: dict[str, Any], folder: Pat
             case "ray":
                 return RayEngine(arguments.address, cores, at_most)
             case "slurm":
-                # A cluster has more cores than this machine: all jobs at once, unless somebody says how many.
+                # A cluster has more cores than this machine: all jobs are submitted at once unless --workers is given.
                 at_once = arguments.workers or len(document["runs"])
                 return SlurmEngine(folder, cores, at_once, dict(arguments.slurm or ()))
     except (MissingEngineError, ValueError) as error:

@@ -49,7 +49,7 @@ def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed:
     else:
         print(f"{len(changed)} runs {state}" if len(changed) != 1 else f"1 run {state}")
         for run in missed:
-            print(f"{run.label} ({run.id}): somebody works on it just now", file=sys.stderr)
+            print(f"{run.label} ({run.id}): another process is working on it", file=sys.stderr)
     return Exit.FINDINGS if missed else Exit.GOOD
 
 

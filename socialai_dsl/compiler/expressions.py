@@ -372,7 +372,7 @@ class Expressions(Emitter):
         return self.alone(mark, value)
 
     def alone(self, mark: int, value: int) -> int:
-        """A value for which only one temporary from `mark` on is taken, where more than a few are."""
+        """The value; where many temporaries are taken, those from `mark` on are given back but for its own."""
         if self.block.taken <= _FEW:
             return value
         self.block.release(mark)

@@ -465,9 +465,9 @@ class _FrameCompiler:
         return left
 
     def _be_in(self, to: Expressions, entry: int, *asked: object) -> bool:
-        """Go to an entry before it is asked whether it begins, where that is about the frame's own state or clock.
+        """Enter an entry before its conditions are evaluated, where they read the frame's own state or clock.
 
-        Whether it went.
+        Returns whether it did.
         """
         member = self.frame.member
         goes = mentions(asked, terms.InState, lambda term: term.member == member) or mentions(

@@ -276,9 +276,8 @@ def _shown(parts: Sequence[Part]) -> int:
         carrying = int(part.words[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
         shown |= (Trait.HANDS | Trait.MORE) * carrying
         gestures = part.words[Header.CHANNELS] - carrying - _PLAIN_CHANNELS
-        shown |= Trait.GESTURES * int(gestures > 0) | (Trait.CELLS | Trait.MORE) * int(
-            gestures > _TWO_GESTURES
-        )
+        shown |= Trait.GESTURES * int(gestures > 0)
+        shown |= (Trait.CELLS | Trait.MORE) * int(gestures > _TWO_GESTURES)
         shown |= Trait.MORE * bool(part.looks)
     return shown
 

@@ -91,9 +91,7 @@ class Trait(IntEnum):
     PUSHED = 1 << 21  # some object takes another status when it is pushed
     GESTURES = 1 << 22  # pictures of the batch have channels for where NPCs point and what they did last
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
-    MORE = (
-        1 << 25
-    )  # pictures of the batch have channels for cells that are pointed at, what NPCs carry, or looks
+    MORE = 1 << 25  # pictures of the batch have channels of CELLS, of HANDS, or of looks
     HANDS = 1 << 26  # one for what NPCs carry
     CELLS = 1 << 27  # two for the cells that NPCs point at
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`

@@ -248,9 +248,8 @@ class _Layout:
         """A direction, or a cell."""
         if isinstance(given, str):
             return 1 + word(key, given, DIRECTIONS)
-        x, y = cell_pair(key, given)
-        across = whole_number(f"{key}[0]", x, 0, self.width - 1, self._hint())
-        return CELL + 32 * whole_number(f"{key}[1]", y, 0, self.height - 1, self._hint()) + across
+        x, y = self._cell(key, given)
+        return CELL + 32 * y + x
 
     def _carries(self, number: int, given: Any) -> None:
         """What a member of the cast has in its hands."""
@@ -288,21 +287,20 @@ class _Layout:
             self._pin(name, given["state"], f"{key}.state")
 
     def _at(self, key: str, number: int, given: Any) -> None:
-        across, down = cell_pair(f"{key}.at", given)
-        x = whole_number(f"{key}.at[0]", across, 0, self.width - 1, self._hint())
-        y = whole_number(f"{key}.at[1]", down, 0, self.height - 1, self._hint())
+        x, y = self._cell(f"{key}.at", given)
         taken = self._taken(number, x, y)
         if taken is not None:
             raise ValueError(f"{key}.at: got [{x}, {y}], where {self.program.entities[taken]} is already")
         self._set(number, Field.X, x)
         self._set(number, Field.Y, y)
 
-    def _hint(self) -> str:
-        return (
-            ""
-            if self.row[Register.WIDTH] != PIN_NONE
-            else " (the smallest room; give `room` for a larger one)"
-        )
+    def _cell(self, key: str, given: Any) -> tuple[int, int]:
+        """A cell of the room."""
+        is_given = self.row[Register.WIDTH] != PIN_NONE
+        hint = "" if is_given else " (the smallest room; give `room` for a larger one)"
+        across, down = cell_pair(key, given)
+        x = whole_number(f"{key}[0]", across, 0, self.width - 1, hint)
+        return x, whole_number(f"{key}[1]", down, 0, self.height - 1, hint)
 
     def _taken(self, number: int, x: int, y: int) -> int | None:
         """Who of the same sort is pinned to this cell: bodies may stand on objects, and objects lie under bodies."""

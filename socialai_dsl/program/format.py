@@ -135,9 +135,7 @@ class Register(IntEnum):
     SAID_LINE = 15  # 1 + line that the entity on turn says this step, 0 none
     LAST_TURN = 16  # Body of the entity on turn
     UTTERANCE = 17  # of the agent this step: 1 + template * fillings + filling, 0 silent
-    CHANGED = (
-        18  # 1: a status, a presence, or what computed statuses read has changed since they were settled
-    )
+    CHANGED = 18  # 1: what computed statuses may depend on has changed since they were last settled
     ACCEPTED = 19  # written by the code at REQUIRE_PC
     ATTEMPT = (
         20  # how many rooms of this episode were not as required; part of the key of every draw at reset

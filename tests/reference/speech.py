@@ -98,7 +98,7 @@ def speak(
     to: Entity | None = None,
     tone: str | None = None,
 ) -> None:
-    """Says something, perhaps to somebody: it reaches who is within earshot, the agent with its tone."""
+    """Says a line, perhaps addressed to one member: everyone within earshot hears it, the agent also its tone."""
     if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
