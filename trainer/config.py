@@ -71,7 +71,7 @@ class RunConfig(BaseModel):
     )
     curriculum: Name = _flag(
         "none",
-        "the choice of a suite's members: none, expert, progress, reverse, a .yaml file of phases or "
+        "the choice of a suite's members: none, even, expert, progress, reverse, a .yaml file of phases or "
         "mine:Curriculum",
     )
     guide: Name = _flag(
@@ -79,7 +79,7 @@ class RunConfig(BaseModel):
         "the guide that shows the task: none, script (the scenario's own script plays, the agent imitates it) or "
         "mine:Guide",
     )
-    guide_share: float = _option(0.6, "first share of the frames, led by the guide (measured)", ge=0, le=1)
+    guide_share: float = _option(0.5, "first share of the frames, led by the guide (measured)", ge=0, le=1)
     imitation_coef: float = _option(1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0)
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
@@ -258,9 +258,9 @@ RECIPES: Final[Mapping[str, Preset]] = {
     "guided": Preset(
         {
             "guide": "script",
-            "bootstrap_timeouts": True,  # as the shipped agents were trained; where waiting is learnt, it costs nothing
             "envs": 128,
             "horizon": 64,
+            "epochs": 2,
             "minibatches": 16,
             "lr": 1e-3,
             "lr_end": 1e-4,

@@ -125,11 +125,11 @@ def _step(
     state.image, state.tokens, state.starts = observation["image"].copy(), observation["tokens"].copy(), ended
     state.returns += reward
     state.lengths += 1
+    if session.tutor is not None:
+        session.tutor.step(ended, success, state.lengths)
     if ended.any():
         tally.count(state, ended, cut, success)
         state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
-    if session.tutor is not None:
-        session.tutor.step(ended, success)
     if session.bonus is not None:
         paid = session.bonus.step(envs, observation["image"], ended)
         require_shape("bonus: the result of step", paid, ended.shape)

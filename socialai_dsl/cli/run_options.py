@@ -21,6 +21,7 @@ _AUTOMATIC: Final = {
     "envs": "256, or the preset's number",
     "frames": "what the recipe needs for this scenario, or the preset's number",
     "guide": "the recipe's",
+    "curriculum": "none; even for a suite with the recipe guided",
 }
 """Options without one default: what stands in its place in the help."""
 
@@ -145,8 +146,8 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
         return checked_config(given | {"frames": 0})
     given.setdefault("threads", automatic_threads())
     recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
-    if "frames" not in given and given.get("net") not in NET_PRESETS:
-        given["frames"] = frames_for(recipe, arguments.scenario)
+    if given.get("net") not in NET_PRESETS:
+        given = usual_for(recipe, arguments.scenario) | given
     return checked_config({"recipe": recipe} | given | hyper)
 
 
@@ -218,24 +219,27 @@ def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
     """`guided` where the scenario has a script and nothing is asked for that excludes a guide, else `plain`."""
     if given.get("net") in NET_PRESETS or given.get("update") == "chunks":
         return "paper"
-    if given.get("guide", "script") != "script" or given.get("curriculum", "none") != "none":
+    if given.get("guide", "script") != "script" or given.get("curriculum", "none") not in ("none", "even"):
         return "plain"
     from socialai_dsl.evaluation.scripts import scripted_name
 
     return "guided" if scripted_name(scenario) is not None else "plain"
 
 
-GUIDED_FRAMES: Final = 2_000_000
+GUIDED_FRAMES: Final = 1_500_000
 GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 
-def frames_for(recipe: str, scenario: str) -> int:
-    """Frames where nobody says how many: what the scenario says, measured to be enough (docs/mastery.md)."""
+def usual_for(recipe: str, scenario: str) -> dict[str, Any]:
+    """Options that depend on the scenario, where nobody gives them: how long it is trained, and a suite's curriculum.
+
+    The frames are those that the scenario's file says, measured to be enough (docs/mastery.md).
+    """
     import socialai_dsl
 
     if recipe != "guided":
-        return PLAIN_FRAMES
+        return {"frames": PLAIN_FRAMES}
     loaded = socialai_dsl.load(scenario)
     if isinstance(loaded, socialai_dsl.LoadedSuite):
-        return loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE
-    return loaded.scenario.training_frames or GUIDED_FRAMES
+        return {"frames": loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE, "curriculum": "even"}
+    return {"frames": loaded.scenario.training_frames or GUIDED_FRAMES}

@@ -11,6 +11,7 @@ import socialai_dsl as sd
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.curricula import Leaves, Phases, build_curriculum
+from trainer.curricula.even import EvenFrames
 from trainer.curricula.phases import read_phases
 from trainer.curricula.progress import WINDOW, LearningProgress
 from trainer.errors import CheckpointError
@@ -36,20 +37,20 @@ def test_the_expert_goes_on_after_a_thousand_episodes_with_enough_success() -> N
     expert = build_curriculum("expert", EXPERT)
     assert len(set(expert.weights())) == 1
     for _ in range(1000):
-        expert.observe(0, True)
+        expert.observe(0, True, 10)
     assert len(set(expert.weights())) == 1
-    expert.observe(0, True)
+    expert.observe(0, True, 10)
     assert [weight > 0 for weight in expert.weights()] == [False] * 7 + [True]
 
 
 def test_the_expert_waits_until_the_last_five_hundred_are_good_enough() -> None:
     expert = build_curriculum("expert", EXPERT)
     for _ in range(3000):
-        expert.observe(0, False)
+        expert.observe(0, False, 10)
     for _ in range(374):
-        expert.observe(0, True)
+        expert.observe(0, True, 10)
     assert len(set(expert.weights())) == 1
-    expert.observe(5, True)
+    expert.observe(5, True, 10)
     assert len(set(expert.weights())) == 2
 
 
@@ -57,7 +58,7 @@ def test_the_expert_needs_no_scaffolding_in_the_suite() -> None:
     leaves = Leaves(INTRODUCTIONS, tuple({"introduction": i} for i in INTRODUCTIONS), (1, 1, 1, 1))
     expert = build_curriculum("expert", leaves)
     for _ in range(1001):
-        expert.observe(0, True)
+        expert.observe(0, True, 10)
     assert [weight > 0 for weight in expert.weights()] == [False, False, False, True]
 
 
@@ -68,7 +69,7 @@ def test_a_reverse_curriculum_falls_from_one_to_zero() -> None:
     for _ in range(20_001):
         told, none = reverse.weights()
         shares.append(told / (told + none))
-        reverse.observe(0, False)
+        reverse.observe(0, False, 10)
     assert shares[0] == 1
     assert shares[10_000] == pytest.approx(0.5, abs=1e-5)
     assert shares[19_999] == pytest.approx(5e-5, abs=1e-5)
@@ -106,7 +107,7 @@ def test_files_that_are_wrong(tmp_path: Path, text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("expart", "expected one of expert, progress, reverse, a .yaml file, or mine:Curriculum"),
+        ("expart", "expected one of even, expert, progress, reverse, a .yaml file, or mine:Curriculum"),
         ("nowhere.yaml", "nowhere.yaml cannot be read"),
         ("no_such_module:Mine", "there is no module 'no_such_module'"),
         ("json:JSONDecoder", "JSONDecoder lacks the method 'observe'"),
@@ -121,24 +122,40 @@ def test_names_that_are_wrong(name: str, message: str) -> None:
 def test_learning_progress_prefers_what_changes() -> None:
     progress = LearningProgress(Leaves(("new", "learnt", "learning"), ({}, {}, {}), (1, 1, 1)))
     for i in range(2 * WINDOW):
-        progress.observe(1, True)
-        progress.observe(2, i >= WINDOW + WINDOW // 2)
+        progress.observe(1, True, 10)
+        progress.observe(2, i >= WINDOW + WINDOW // 2, 10)
     assert [progress.progress(member) for member in range(3)] == [1, 0, 0.5]
     new, learnt, learning = progress.weights()
     assert new > learning > learnt > 0
 
 
-@pytest.mark.parametrize("name", ["expert", "progress"])
+def test_even_frames_give_short_episodes_more_often() -> None:
+    even = EvenFrames(Leaves(("short", "long", "rare"), ({}, {}, {}), (2, 2, 1)))
+    assert even.weights() == [1 << 16, 1 << 16, 1 << 15], (
+        "the suite's own chances, as long as nothing is known"
+    )
+    for _ in range(200):
+        even.observe(0, True, 4)
+        even.observe(1, False, 40)
+        even.observe(2, False, 8)
+    short, long, rare = even.weights()
+    assert (short, long, rare) == (1 << 16, round((1 << 16) / 10), 1 << 14)
+    for _ in range(2000):
+        even.observe(1, True, 4)
+    assert even.weights() == [short, short, rare], "episodes of long ago are forgotten"
+
+
+@pytest.mark.parametrize("name", ["even", "expert", "progress"])
 def test_the_state_is_all_it_remembers(name: str) -> None:
     rng = np.random.default_rng(3)
     one, other = build_curriculum(name, EXPERT), build_curriculum(name, EXPERT)
     for _ in range(900):
-        one.observe(int(rng.integers(8)), bool(rng.random() < 0.9))
+        one.observe(int(rng.integers(8)), bool(rng.random() < 0.9), int(rng.integers(1, 40)))
     other.load_state(one.state())
     for _ in range(900):
-        member, success = int(rng.integers(8)), bool(rng.random() < 0.9)
-        one.observe(member, success)
-        other.observe(member, success)
+        ended = int(rng.integers(8)), bool(rng.random() < 0.9), int(rng.integers(1, 40))
+        one.observe(*ended)
+        other.observe(*ended)
         assert one.weights() == other.weights()
 
 
@@ -162,8 +179,8 @@ class Alternating:
     def __init__(self, leaves: Leaves) -> None:
         self.count, self.seen = len(leaves.names), [0]
 
-    def observe(self, member: int, success: bool) -> None:
-        del success
+    def observe(self, member: int, success: bool, steps: int) -> None:
+        del success, steps
         self.seen = [self.seen[0] + 1, *self.seen[1:], member]
 
     def weights(self) -> list[int]:
@@ -188,7 +205,7 @@ def test_a_curriculum_chooses_from_the_first_episode_on() -> None:
     assert session.envs.member_ids().tolist() == [0] * 8
 
 
-@pytest.mark.parametrize("name", [MINE, "progress"])
+@pytest.mark.parametrize("name", [MINE, "even", "progress"])
 @pytest.mark.thorough("trains three times")
 def test_a_resumed_run_goes_on_to_the_same_bits(name: str, tmp_path: Path) -> None:
     whole = read(train(config(128 * 6, name), envs(), tmp_path / "whole"))
@@ -231,7 +248,7 @@ def test_episodes_are_credited_to_the_member_that_was_played() -> None:
         ended = terminated | truncated
         ended_members += before[ended].tolist()
         if ended.any():
-            session.tutor.step(ended, ended)
+            session.tutor.step(ended, ended, np.ones(8, np.int64))
         before = playing.member_ids()
     assert session.tutor.curriculum.state()["seen"][1:] == ended_members
     assert len(ended_members) > 20

@@ -1,29 +1,33 @@
-"""Curricula: the choice of a suite's members while training, by the agent's success."""
+"""Curricula: the choice of a suite's members while training, by the episodes so far."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from trainer.curricula.base import Curriculum, Leaves, Tutor
+from trainer.curricula.even import EvenFrames
 from trainer.curricula.phases import Phases, read_phases
 from trainer.curricula.progress import LearningProgress
 from trainer.extensions import load_class
 
 __all__ = ["Curriculum", "Leaves", "Phases", "Tutor", "build_curriculum"]
 
-SHIPPED = ("expert", "progress", "reverse")
+_CLASSES: dict[str, Callable[[Leaves], Curriculum]] = {"even": EvenFrames, "progress": LearningProgress}
+
+SHIPPED = ("even", "expert", "progress", "reverse")
 
 
 def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curriculum:
-    """The curriculum of a name: `expert`, `progress`, `reverse`, a YAML file of phases, or `mine:Curriculum`.
+    """The curriculum of a name: `even`, `expert`, `progress`, `reverse`, a YAML file of phases, or `mine:Curriculum`.
 
     A class of the user's, looked for in `folder` first, is built as `Curriculum(leaves)`.
 
     Raises:
         ValueError: there is no such curriculum, or it does not fit the suite.
     """
-    if name == "progress":
-        return LearningProgress(leaves)
+    if name in _CLASSES:
+        return _CLASSES[name](leaves)
     if name in SHIPPED:
         return Phases(read_phases(Path(__file__).with_name(f"{name}.yaml")), leaves)
     if name.endswith((".yaml", ".yml")):

@@ -37,10 +37,10 @@ class Leaves:
 
 @runtime_checkable
 class Curriculum(Protocol):
-    """Chooses members by success so far alone; `--curriculum mine:Curriculum` builds `Curriculum(leaves)`."""
+    """Chooses members by the episodes so far alone; `--curriculum mine:Curriculum` builds `Curriculum(leaves)`."""
 
-    def observe(self, member: int, success: bool) -> None:
-        """Take in that an episode of a member, an index into `Leaves.names`, has ended."""
+    def observe(self, member: int, success: bool, steps: int) -> None:
+        """Take in that an episode of a member, an index into `Leaves.names`, has ended after a number of steps."""
 
     def weights(self) -> Sequence[int]:
         """The relative probability of each member in later episodes: whole numbers of at least 0, not all 0."""
@@ -71,12 +71,13 @@ class Tutor:
         self._choose()
         self._playing: NDArray[np.int64] = self._envs.member_ids()
 
-    def step(self, ended: NDArray[np.bool_], success: NDArray[np.bool_]) -> None:
-        """Take in the episodes that ended in a step, bool (E,) each, in the order of the environments."""
+    def step(self, ended: NDArray[np.bool_], success: NDArray[np.bool_], lengths: NDArray[np.int64]) -> None:
+        """Take in the episodes that ended in a step, in the order of the environments; all arrays are (E,)."""
         if not ended.any():
             return
         for environment in np.flatnonzero(ended).tolist():
-            self.curriculum.observe(int(self._playing[environment]), bool(success[environment]))
+            member, steps = int(self._playing[environment]), int(lengths[environment])
+            self.curriculum.observe(member, bool(success[environment]), steps)
         self._choose()
         self._playing = self._envs.member_ids()
 

@@ -143,9 +143,9 @@ class Phases:
         self._episodes = 0
         self._last: list[int] = []
 
-    def observe(self, member: int, success: bool) -> None:
+    def observe(self, member: int, success: bool, steps: int) -> None:
         """See `Curriculum.observe`; whichever member it was of, an episode counts for the phase it ends in."""
-        del member
+        del member, steps
         until = self._plan.phases[self.phase].until
         self._episodes += 1
         if until is None:

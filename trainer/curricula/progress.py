@@ -23,8 +23,9 @@ class LearningProgress:
         self._natural = leaves.weights
         self._last: list[list[int]] = [[] for _ in leaves.names]
 
-    def observe(self, member: int, success: bool) -> None:
-        """See `Curriculum.observe`."""
+    def observe(self, member: int, success: bool, steps: int) -> None:
+        """See `Curriculum.observe`; how long the episode was does not count."""
+        del steps
         last = self._last[member]
         last.append(int(success))
         del last[: -2 * WINDOW]

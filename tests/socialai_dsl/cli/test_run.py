@@ -14,7 +14,7 @@ from PIL import Image
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.run import add_arguments
-from socialai_dsl.cli.run_options import frames_for, new_config
+from socialai_dsl.cli.run_options import new_config, usual_for
 from socialai_dsl.errors import UsageError
 from trainer.config import RunConfig, configure
 
@@ -421,9 +421,13 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
         "pair": "suite: pair\nabout: Two.\nmembers: [corridor.yaml, short.yaml]\ntraining_frames: 8192\n",
     }.items():
         Path(f"{name}.yaml").write_text(text)
-    budgets = {name: frames_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair")}
-    assert budgets == {"corridor": 2_000_000, "short": 4096, "pair": 8192}
-    assert frames_for("plain", "short.yaml") == 600_000
+    usual = {name: usual_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair")}
+    assert usual == {
+        "corridor": {"frames": 1_500_000},
+        "short": {"frames": 4096},
+        "pair": {"frames": 8192, "curriculum": "even"},
+    }
+    assert usual_for("plain", "pair.yaml") == {"frames": 600_000}
 
 
 @pytest.mark.thorough("trains twice")
