@@ -1,7 +1,7 @@
 """Features of frames while acting; each distinct frame is computed once.
 
 Of 8,192 frames of a rollout a few hundred images and histories are distinct. Both are kept in tables; a history is
-encoded from its longest known beginning, the features of a pair of the two are computed once.
+encoded once, and so are the features of a pair of the two.
 """
 
 from __future__ import annotations
@@ -82,8 +82,6 @@ class Actor:
         self.images = DistinctRows(self.net.spec.image_shape, np.uint8)
         self.histories = DistinctRows((self._length,), np.int16)
         self.pairs = DistinctRows((2,), np.int64)
-        self._last_history: Int64 | None = None  # (E,), row of each environment
-        self._words = self.net.dialogue.word_inputs()
         self._texts = torch.zeros(1, self.net.dialogue.size, device=self.device)  # (D, size)
         self._features = torch.zeros(1, self.net.features, device=self.device)  # (P, F)
 
@@ -127,15 +125,11 @@ class Actor:
         return self.net.perceive(prepared, texts, self.move(image_index), self.move(text_index))
 
     def _hear(self, ids: Int64, tokens: NDArray[np.int16]) -> Int64:
-        """Row of every history, int64 (E,); new ones are encoded, from where the same environment was if possible."""
+        """Row of every history, int64 (E,); new ones are encoded."""
         rows, fresh = self.histories.add(ids, tokens, self._read)
         if len(fresh):
-            words = self.histories.data[-len(fresh) :]
-            parents = np.zeros_like(fresh) if self._last_history is None else self._last_history[fresh]
-            beginnings = self.histories.data[parents]
-            parents = np.where(((beginnings == words) | (beginnings == 0)).all(1), parents, 0)
-            self._texts = torch.cat((self._texts, self._encode(words, parents)))
-        self._last_history = rows
+            tree = prefix_tree(self.histories.data[-len(fresh) :], self.device)
+            self._texts = torch.cat((self._texts, self.net.dialogue(tree)[tree.leaves]))
         return rows
 
     def _read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:
@@ -145,19 +139,6 @@ class Actor:
             if not 0 <= got <= last:
                 raise ObservationError(f"tokens: got {got}, expected ids from 0 to {last}")
         return self.net.reader.read(tokens)
-
-    def _encode(self, words: NDArray[np.int16], parents: Int64) -> Tensor:
-        """Encode histories (K, L) that continue those of the rows `parents`, int64 (K,); (K, size)."""
-        known = np.count_nonzero(self.histories.data[parents], axis=1)  # (K,)
-        if not known.any():
-            tree = prefix_tree(words, self.device)
-            states: Tensor = self.net.dialogue(tree)
-            return states[tree.leaves]
-        new = np.count_nonzero(words, axis=1) - known  # (K,)
-        columns = known[:, None] + np.arange(new.max())  # (K, S)
-        padded = np.pad(words, ((0, 0), (0, new.max())))
-        suffix = self.move(np.take_along_axis(padded, columns, 1).astype(np.int64))
-        return self.net.dialogue.extend(self._texts[self.move(parents)], suffix, self._words)
 
     def move(self, array: NDArray[Any]) -> Tensor:
         """The array as a tensor on the network's device."""

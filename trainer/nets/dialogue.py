@@ -121,48 +121,15 @@ class DialogueEncoder(nn.Module):
         self.embedding = nn.Embedding(vocabulary_size, hidden)
         self.gru = nn.GRU(hidden, hidden)
 
-    def word_inputs(self) -> Tensor:
-        """The GRU's input gates of every word of the vocabulary, (V, 3 * hidden), made once per batch of histories."""
-        w_ih, b_ih = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("bias_ih_l0")
-        return functional.linear(self.embedding.weight, w_ih, b_ih)
-
-    def _advance(self, inputs: Tensor, states: Tensor) -> Tensor:
-        """One word more: input gates (K, 3 * hidden) and states (K, hidden) to the next states.
-
-        PyTorch's GRU (Cho et al. 2014), gates in its order: reset, update, new.
-        """
-        size = self.hidden
-        w_hh, b_hh = self.gru.get_parameter("weight_hh_l0"), self.gru.get_parameter("bias_hh_l0")
-        recurrent = functional.linear(states, w_hh, b_hh)
-        gates = torch.sigmoid(inputs[:, : 2 * size] + recurrent[:, : 2 * size])
-        new = torch.tanh(torch.addcmul(inputs[:, 2 * size :], gates[:, :size], recurrent[:, 2 * size :]))
-        return torch.lerp(new, states, gates[:, size:])
-
     def forward(self, tree: PrefixTree) -> Tensor:
         """Encode the states of a tree, level by level; (K + 1, size), the empty history's row 0 being zero."""
-        inputs = functional.embedding(tree.tokens, self.word_inputs())
-        w_hh, b_hh = self.gru.get_parameter("weight_hh_l0"), self.gru.get_parameter("bias_hh_l0")
+        w_ih, w_hh = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("weight_hh_l0")
+        b_ih, b_hh = self.gru.get_parameter("bias_ih_l0"), self.gru.get_parameter("bias_hh_l0")
+        words = functional.linear(self.embedding.weight, w_ih, b_ih)  # (V, 3 * hidden)
+        inputs = functional.embedding(tree.tokens, words)  # (K, 3 * hidden)
         states: Tensor = _TreeGru.apply(  # type: ignore[no-untyped-call]
             inputs, w_hh, b_hh, tree.parents, tree.offsets
         )
-        return states
-
-    @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
-        """Continue encodings by the words heard since, without gradients.
-
-        Args:
-            states: (K, size) encodings so far.
-            tokens: int64 (K, S), the new words of each, 0-padded.
-            inputs: result of `word_inputs` under the current weights.
-
-        Returns:
-            (K, size) encodings after the new words.
-        """
-        states = states.clone()
-        for words in tokens.unbind(1):
-            longer = words.nonzero().squeeze(1)
-            states[longer] = self._advance(inputs[words[longer]], states[longer])
         return states
 
 
@@ -190,11 +157,3 @@ class HeardWords(DialogueEncoder):
             words = heard.index_select(0, tree.parents[first:behind])
             heard[1 + first : 1 + behind] = words.scatter_(1, tree.tokens[first:behind, None], 1)
         return torch.cat((states, heard), 1)
-
-    @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
-        """See `DialogueEncoder.extend`."""
-        recurrent, heard = self.split(states)
-        heard = heard.scatter(1, tokens, 1)
-        heard[:, 0] = 0  # the padding is no word
-        return torch.cat((super().extend(recurrent, tokens, inputs), heard), 1)

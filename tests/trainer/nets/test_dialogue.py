@@ -1,4 +1,4 @@
-"""Streamed encoding of histories agrees with encoding each from its first word, in values and gradients."""
+"""Encoding of shared beginnings agrees with encoding each from its first word, in values and gradients."""
 
 import numpy as np
 import pytest
@@ -53,18 +53,6 @@ def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: DialogueEn
         assert torch.allclose(one, other, rtol=0, atol=1e-12)
 
 
-def test_extending_agrees_with_reencoding(encoder: DialogueEncoder) -> None:
-    rows = conversations(5, 40)[1:]
-    full = encode_one_by_one(encoder, rows)
-    lengths = (rows > 0).sum(1)
-    known = np.maximum(lengths - np.array([5, 4, 3, 2, 1, 0] * 5), 0)
-    starts = np.where(np.arange(40) < known[:, None], rows, 0)
-    suffix = np.array([[*row[begun:], *[0] * begun][:6] for row, begun in zip(rows, known, strict=True)])
-    states = encode_one_by_one(encoder, starts).detach()
-    extended = encoder.extend(states, torch.tensor(suffix.astype(np.int64)), encoder.word_inputs())
-    assert torch.allclose(extended, full, rtol=0, atol=1e-12)
-
-
 def test_the_empty_history_is_zero(encoder: DialogueEncoder) -> None:
     assert (encode_tree(encoder, np.zeros((3, 8), np.int16)) == 0).all()
 
@@ -80,14 +68,3 @@ def test_words_heard_stay_beside_the_recurrent_state() -> None:
     got = encode_tree(both, rows)
     assert torch.allclose(got, encode_one_by_one(both, rows), rtol=0, atol=1e-12)
     assert torch.equal(both.split(got)[1], heard_by(rows, 20))
-
-
-def test_extending_adds_the_words_heard_since() -> None:
-    both = HeardWords(20, 16).double()
-    rows = np.array([[3, 1, 2, 4], [5, 5, 6, 0], [7, 0, 0, 0]], np.int16)
-    known = np.array([[3, 0, 0, 0], [5, 0, 0, 0], [7, 0, 0, 0]], np.int16)
-    before = encode_tree(both, known).detach()
-    suffix = torch.tensor([[1, 2, 4], [5, 6, 0], [0, 0, 0]])
-    after = both.extend(before, suffix, both.word_inputs())
-    assert torch.allclose(after, encode_tree(both, rows), rtol=0, atol=1e-12)
-    assert torch.equal(both.split(before)[1], heard_by(known, 20)), "what was known stays as it is"
