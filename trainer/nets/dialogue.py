@@ -123,6 +123,8 @@ class DialogueEncoder(nn.Module):
 
     def forward(self, tree: PrefixTree) -> Tensor:
         """Encode the states of a tree, level by level; (K + 1, size), the empty history's row 0 being zero."""
+        if not len(tree.tokens):  # nothing was heard, so no weight takes part
+            return self.embedding.weight.new_zeros(1, self.hidden)
         w_ih, w_hh = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("weight_hh_l0")
         b_ih, b_hh = self.gru.get_parameter("bias_ih_l0"), self.gru.get_parameter("bias_hh_l0")
         words = functional.linear(self.embedding.weight, w_ih, b_ih)  # (V, 3 * hidden)
