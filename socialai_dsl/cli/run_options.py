@@ -21,7 +21,7 @@ _AUTOMATIC: Final = {
     "envs": "256, or the preset's number",
     "frames": "what the recipe needs for this scenario, or the preset's number",
     "guide": "the recipe's",
-    "curriculum": "none; even for a suite with the recipe guided",
+    "curriculum": "none; even where the recipe guided trains a suite that draws its members",
 }
 """Options without one default: what stands in its place in the help."""
 
@@ -231,7 +231,7 @@ GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 
 def usual_for(recipe: str, scenario: str) -> dict[str, Any]:
-    """Options that depend on the scenario, where nobody gives them: how long it is trained, and a suite's curriculum.
+    """Defaults that depend on the scenario: its frames, and the curriculum of a suite that draws its members.
 
     The frames are those that the scenario's file says, measured to be enough (docs/mastery.md).
     """
@@ -240,6 +240,7 @@ def usual_for(recipe: str, scenario: str) -> dict[str, Any]:
     if recipe != "guided":
         return {"frames": PLAIN_FRAMES}
     loaded = socialai_dsl.load(scenario)
-    if isinstance(loaded, socialai_dsl.LoadedSuite):
-        return {"frames": loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE, "curriculum": "even"}
-    return {"frames": loaded.scenario.training_frames or GUIDED_FRAMES}
+    if not isinstance(loaded, socialai_dsl.LoadedSuite):
+        return {"frames": loaded.scenario.training_frames or GUIDED_FRAMES}
+    usual: dict[str, Any] = {"frames": loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE}
+    return usual | ({"curriculum": "even"} if loaded.suite.draw == "uniform" else {})

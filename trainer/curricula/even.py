@@ -1,4 +1,4 @@
-"""A curriculum in which all members of a suite get equal shares of the frames, however long their episodes are."""
+"""A curriculum that shares the frames, not the episodes, among the members of a suite."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ _ONE = 1 << 16
 class EvenFrames:
     """Weights a member by its natural weight, divided by the mean length of its latest episodes.
 
-    The suite draws episodes, but the agent learns from steps: without this, short episodes teach little. The mean is
-    over all episodes of a member up to `WINDOW`, then exponential.
+    A member's share of the frames is then its chance in the suite. The suite draws episodes, but the agent learns from
+    steps: members with short episodes would teach little. The mean is over all episodes of a member up to `WINDOW`,
+    then exponential.
     """
 
     def __init__(self, leaves: Leaves) -> None:
@@ -35,7 +36,8 @@ class EvenFrames:
         shares = [
             natural / (steps or usual) for natural, steps in zip(self._natural, self._steps, strict=True)
         ]
-        return [max(1, round(_ONE * share / max(shares))) for share in shares]
+        largest = max(shares)
+        return [max(1, round(_ONE * share / largest)) for share in shares]
 
     def state(self) -> dict[str, Any]:
         """See `Curriculum.state`."""

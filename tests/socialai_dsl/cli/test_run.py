@@ -419,13 +419,15 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
     for name, text in {
         "short": "scenario: short\nextends: corridor.yaml\ntraining_frames: 4096\n",
         "pair": "suite: pair\nabout: Two.\nmembers: [corridor.yaml, short.yaml]\ntraining_frames: 8192\n",
+        "acts": "suite: acts\nabout: Two.\nmembers: [corridor.yaml, short.yaml]\ndraw: in_sequence\n",
     }.items():
         Path(f"{name}.yaml").write_text(text)
-    usual = {name: usual_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair")}
+    usual = {name: usual_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
     assert usual == {
         "corridor": {"frames": 1_500_000},
         "short": {"frames": 4096},
         "pair": {"frames": 8192, "curriculum": "even"},
+        "acts": {"frames": 6_000_000},  # nothing is drawn that a curriculum could choose
     }
     assert usual_for("plain", "pair.yaml") == {"frames": 600_000}
 
