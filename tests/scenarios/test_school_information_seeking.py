@@ -468,7 +468,7 @@ class TestSuite:
         expert = build_curriculum("expert", leaves)
         assert all(expert.weights())
         for k in range(1500):
-            expert.observe(k % len(leaves.names), success=True)
+            expert.observe(k % len(leaves.names), success=True, steps=10)
         left = {name for name, weight in zip(leaves.names, expert.weights(), strict=True) if weight}
         assert left == {
             name
