@@ -1,18 +1,16 @@
-"""The records of a training run: starts, a row of figures for each update, TensorBoard events, W&B."""
+"""The records of a training run: starts, a row of figures for each update, TensorBoard events, a tracker."""
 
 from __future__ import annotations
 
 import contextlib
-import importlib
 import json
 import os
 import time
-import uuid
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import torch
@@ -23,7 +21,6 @@ from trainer.session import Session, State
 
 FILE_NAME = "metrics.jsonl"
 STARTS = "starts.jsonl"
-_ID_FILE = "wandb_id.txt"
 
 
 @dataclass
@@ -115,8 +112,21 @@ def episode_metrics(tally: Tally, before: Mapping[str, Any], after: Mapping[str,
     }
 
 
+class Tracker(Protocol):
+    """Another place for the figures, such as a service that draws them; one that fails must not stop the run."""
+
+    def open(self) -> None:
+        """Begin, or go on with a resumed run; ValueError says why it cannot."""
+
+    def write(self, scalars: Mapping[str, float], frames: int) -> None:
+        """Take the figures of the update that reached `frames`; a resumed run makes some of them again."""
+
+    def close(self) -> None:
+        """End."""
+
+
 class MetricsLog:
-    """`starts.jsonl`, `metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
+    """`starts.jsonl`, `metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and a tracker.
 
     Opening it records the start, and cuts rows and events back to `update`, so that a resumed run's log equals that
     of one that never stopped. TensorBoard's steps and the tracker's are frames.
@@ -131,7 +141,7 @@ class MetricsLog:
         run_dir: Path,
         config: RunConfig,
         update: int = 0,
-        tracker: WandbTracker | None = None,
+        tracker: Tracker | None = None,
     ) -> None:
         run_dir.mkdir(parents=True, exist_ok=True)
         path = run_dir / FILE_NAME
@@ -237,86 +247,3 @@ def record_start(run_dir: Path, update: int, config: RunConfig) -> None:
         file.write(unfinished + json.dumps({"time": began, "update": update, "frames": frames} | now) + "\n")
         file.flush()
         os.fsync(file.fileno())
-
-
-class TrackingWarning(UserWarning):
-    """Figures are not sent any more; the run goes on."""
-
-
-@dataclass
-class WandbTracker:
-    """Sends figures to a project of Weights & Biases, where they are drawn over frames.
-
-    A resumed run goes on where it was: what it does again is not sent twice. Once begun, nothing that goes wrong
-    stops the training; it is said once, and the figures stay in `metrics.jsonl`.
-
-    Attributes:
-        project: its name.
-        run_dir: folder of the run, where W&B keeps its own files as well.
-        config: what the run was asked for, shown beside its curves.
-        name: what the run is called there.
-
-    Raises:
-        ValueError: the package is not installed.
-    """
-
-    project: str
-    run_dir: Path
-    config: Mapping[str, Any]
-    name: str
-    _run: Any = field(default=None, init=False)
-
-    def __post_init__(self) -> None:
-        try:
-            self._wandb = importlib.import_module("wandb")
-        except ImportError:
-            raise ValueError(
-                "W&B is not there: pip install 'socialai-dsl[wandb]', or leave out --wandb"
-            ) from None
-
-    def open(self) -> None:
-        """Begin, or go on where the run was; ValueError says why it cannot."""
-        path = self.run_dir / _ID_FILE
-        if not path.exists():
-            path.write_text(uuid.uuid4().hex[:12] + "\n", encoding="utf-8")
-        try:
-            self._run = self._wandb.init(
-                project=self.project,
-                name=self.name,
-                config=dict(self.config),
-                id=path.read_text(encoding="utf-8").strip(),
-                dir=str(self.run_dir),
-                resume="allow",
-                # The terminal shows the progress; W&B is not to copy what is printed.
-                settings=self._wandb.Settings(console="off"),
-            )
-        except Exception as error:
-            raise ValueError(f"W&B cannot begin: {type(error).__name__}: {error}") from error
-
-    def write(self, scalars: Mapping[str, float], frames: int) -> None:
-        """Take the figures of the update that reached `frames`."""
-        with self._forgiven():
-            # A resumed run makes again what came after its checkpoint.
-            if self._run is not None and frames >= self._run.step:
-                self._run.log(dict(scalars), step=frames)
-
-    def close(self) -> None:
-        """End."""
-        with self._forgiven():
-            if self._run is not None:
-                self._run.finish()
-        self._run = None
-
-    @contextlib.contextmanager
-    def _forgiven(self) -> Iterator[None]:
-        """Give up, with a warning, where sending fails."""
-        try:
-            yield
-        except Exception as error:
-            self._run = None
-            warnings.warn(
-                f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
-                f"{self.run_dir / FILE_NAME}",
-                TrackingWarning,
-                stacklevel=2,
-            )

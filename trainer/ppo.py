@@ -18,7 +18,7 @@ from trainer import actions as heads
 from trainer.chunks import Chunks, chunks
 from trainer.config import RunConfig
 from trainer.errors import require_finite
-from trainer.logging import Metrics, MetricsLog, WandbTracker
+from trainer.logging import Metrics, MetricsLog, Tracker
 from trainer.minibatch import Batch, Environments, environments
 from trainer.rollout import Rollout, collect
 from trainer.session import Mapper, Session, explained_stops, threads_of
@@ -237,7 +237,7 @@ def train(
     run_dir: Path,
     progress: Callable[[Mapping[str, Any]], None] | None = None,
     resume: bool = False,
-    tracker: WandbTracker | None = None,
+    tracker: Tracker | None = None,
     program: Any = None,
 ) -> Path:
     """Train a network and return the path of its final checkpoint.

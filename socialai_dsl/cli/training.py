@@ -14,9 +14,9 @@ from trainer.config import RunConfig
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded
+    from socialai_dsl.cli.tracking import WandbTracker
     from socialai_dsl.evaluation.testing import Evaluation
     from socialai_dsl.program_suite import Playable
-    from trainer.logging import WandbTracker
 
 
 def train_in(
@@ -134,7 +134,7 @@ def _tracker(config: RunConfig, folder: Path) -> "WandbTracker | None":
     """Where the figures go besides the folder, if anywhere."""
     if config.wandb is None:
         return None
-    from trainer.logging import WandbTracker
+    from socialai_dsl.cli.tracking import WandbTracker
 
     name = f"{scenario_folder_name(config.scenario)} {folder.name}"
     return WandbTracker(config.wandb, folder, config.model_dump(), name)

@@ -7,9 +7,21 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.cli.tracking import TrackingWarning, WandbTracker
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.logging import TrackingWarning, WandbTracker
+from trainer.config import RunConfig
 from trainer.ppo import train
+
+CONFIG = RunConfig(
+    envs=8,
+    horizon=8,
+    minibatches=2,
+    epochs=2,
+    frames=6 * 8 * 8,
+    threads=1,
+    checkpoint_every=2,
+    tensorboard=False,
+)
 
 
 class FakeRun:
@@ -58,9 +70,9 @@ def wandb(monkeypatch: pytest.MonkeyPatch) -> FakeWandb:
     return fake
 
 
-def test_a_run_is_sent_over_frames(wandb: FakeWandb, tmp_path: Path, small_config: Any) -> None:
+def test_a_run_is_sent_over_frames(wandb: FakeWandb, tmp_path: Path) -> None:
     tracker = WandbTracker("project", tmp_path, {"seed": 0}, "a run")
-    train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
+    train(CONFIG, EchoEnvs(8), tmp_path, tracker=tracker)
     (run,) = wandb.runs
     assert (run.options["project"], run.options["name"], run.options["config"]) == (
         "project",
@@ -72,7 +84,7 @@ def test_a_run_is_sent_over_frames(wandb: FakeWandb, tmp_path: Path, small_confi
     assert run.finished
 
 
-def test_a_resumed_run_goes_on_where_it_was(wandb: FakeWandb, tmp_path: Path, small_config: Any) -> None:
+def test_a_resumed_run_goes_on_where_it_was(wandb: FakeWandb, tmp_path: Path) -> None:
     """The checkpoint is older than what was sent: that is made again, but not sent again."""
     tracker = WandbTracker("project", tmp_path, {}, "a run")
 
@@ -81,32 +93,30 @@ def test_a_resumed_run_goes_on_where_it_was(wandb: FakeWandb, tmp_path: Path, sm
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker, progress=stop_at_5)
+        train(CONFIG, EchoEnvs(8), tmp_path, tracker=tracker, progress=stop_at_5)
     again = WandbTracker("project", tmp_path, {}, "a run")
-    train(small_config(), EchoEnvs(8), tmp_path, tracker=again, resume=True)
+    train(CONFIG, EchoEnvs(8), tmp_path, tracker=again, resume=True)
     first, second = wandb.runs
     assert first.options["id"] == second.options["id"]
     assert [step // 64 for step, _ in first.logged] == [1, 2, 3, 4, 5]
     assert [step // 64 for step, _ in second.logged] == [6]
 
 
-def test_a_failure_on_the_way_is_said_once_and_stops_nothing(
-    wandb: FakeWandb, tmp_path: Path, small_config: Any
-) -> None:
+def test_a_failure_on_the_way_is_said_once_and_stops_nothing(wandb: FakeWandb, tmp_path: Path) -> None:
     wandb.fails_at = 3 * 64
     tracker = WandbTracker("project", tmp_path, {}, "a run")
     with pytest.warns(TrackingWarning, match=r"OSError: the network is gone.*training goes on") as caught:
-        train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
+        train(CONFIG, EchoEnvs(8), tmp_path, tracker=tracker)
     assert len(caught) == 1
     assert len((tmp_path / "metrics.jsonl").read_text().splitlines()) == 6
     assert len(wandb.runs[0].logged) == 2
 
 
-def test_a_failure_at_the_start_is_explained(wandb: FakeWandb, tmp_path: Path, small_config: Any) -> None:
+def test_a_failure_at_the_start_is_explained(wandb: FakeWandb, tmp_path: Path) -> None:
     wandb.refuses = True
     tracker = WandbTracker("project", tmp_path, {}, "a run")
     with pytest.raises(ValueError, match="W&B cannot begin: RuntimeError: no API key"):
-        train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
+        train(CONFIG, EchoEnvs(8), tmp_path, tracker=tracker)
 
 
 def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -115,13 +125,11 @@ def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
         WandbTracker("project", tmp_path, {}, "a run")
 
 
-def test_the_package_itself_offline(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, small_config: Any
-) -> None:
+def test_the_package_itself_offline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Where the extra is installed: a run without a network leaves a file to be sent later."""
     pytest.importorskip("wandb", reason="the extra `wandb` is not installed")
     monkeypatch.setenv("WANDB_MODE", "offline")
     tracker = WandbTracker("project", tmp_path, {"seed": 0}, "a run")
-    train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
+    train(CONFIG, EchoEnvs(8), tmp_path, tracker=tracker)
     (written,) = (tmp_path / "wandb").glob("offline-run-*/*.wandb")
     assert written.stat().st_size > 0
