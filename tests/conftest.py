@@ -4,6 +4,11 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# Tests promise nothing about speed, and a busy machine is no failure.
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
 
 # Small tensors gain nothing from threads, and test machines have few cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")

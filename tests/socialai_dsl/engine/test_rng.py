@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
@@ -28,7 +28,6 @@ def all_draws(
     )
 
 
-@settings(deadline=None)
 @given(
     seed=st.one_of(st.integers(0, draws.MAX_SEED), st.just(draws.TEST_DOMAIN)),
     index=st.integers(0, 2**40),

@@ -36,7 +36,7 @@ def told(envs: Any, actions: np.ndarray) -> list[bytes]:
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     name=st.sampled_from(shipped_scenarios()),
     before=st.integers(0, 120),

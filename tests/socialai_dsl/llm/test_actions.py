@@ -147,7 +147,7 @@ def test_the_grammar_names_every_word() -> None:
 
 
 @given(st.text())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_any_text_is_read_without_an_error(reply: str) -> None:
     action, error = LANGUAGE.parse(reply)
     assert (action is None) == bool(error)
