@@ -65,7 +65,8 @@ fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EAC
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[fuzz]'
 	$(BIN)/python -m tests.fuzzing.run --seconds $(SECONDS_EACH) $(ARGS)
 
-nightly: $(STAMP) ## everything that takes long: the long tests, what agents learn, half an hour of fuzzing, planted mistakes, how time grows
+nightly: $(STAMP) ## everything that takes long: all tests, what agents learn, half an hour of fuzzing, planted mistakes, how time grows
+	$(MAKE) test-all
 	$(MAKE) test-long
 	$(MAKE) test-learning
 	$(MAKE) test-faults
