@@ -29,7 +29,7 @@ def check_scenario(
         deep: also try what success takes.
         say: takes the lines of the report as they come.
     """
-    place = loaded.resolved.key_span(("outcome",))
+    place = loaded.resolved.tree.key_span(("outcome",))
     report = ScenarioReport(called, effort.rooms, effort.seed, place)
     said = 0
 

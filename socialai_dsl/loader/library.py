@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.reader import (
     MAX_FILES,
     MAX_NAME,
     MAX_TOTAL_BYTES,
-    Data,
-    Document,
     display_name,
     is_file,
     read_document,
     read_source,
 )
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.source import Node, Source, Span
 
 SUFFIXES: Final = (".yaml", ".yml")
 
@@ -136,144 +134,20 @@ def _part(text: str, begin: int, end: int, start: Span) -> Part:
     return Part(text[begin:end], start.shifted(begin, max(1, end - begin)))
 
 
-Children: TypeAlias = "dict[str, Node] | list[Node] | None"
-
-
-class Node:
-    """A part of a document.
-
-    Attributes:
-        document: the file it was written in.
-        path: where in that file.
-        children: the entries of a mapping or list; None for a scalar.
-        value: the scalar's value; None for a mapping or list.
-        substituted: whether it is the value of a parameter, so that places inside of it mean nothing.
-    """
-
-    __slots__ = ("children", "document", "path", "substituted", "value")
-
-    def __init__(self, document: Document, path: DataPath, data: Data) -> None:
-        self.document = document
-        self.path = path
-        self.value: str | int | float | bool | None = None
-        self.children: Children = None
-        self.substituted = False
-        if isinstance(data, dict):
-            self.children = {key: Node(document, (*path, key), part) for key, part in data.items()}
-        elif isinstance(data, list):
-            self.children = [Node(document, (*path, i), part) for i, part in enumerate(data)]
-        else:
-            self.value = data
-
-    @property
-    def file(self) -> str:
-        """How messages call the file this part was written in."""
-        return self.document.source.name
-
-    @property
-    def kind(self) -> str:
-        """The kind of this part, for messages."""
-        if isinstance(self.children, dict):
-            return "a mapping"
-        if isinstance(self.children, list):
-            return "a list"
-        if self.value is None:
-            return "empty"
-        if isinstance(self.value, bool):
-            return "`true` or `false`"
-        return "a text" if isinstance(self.value, str) else "a number"
-
-    def value_span(self) -> Span:
-        """Where the part stands."""
-        return self.document.value_span(self.path)
-
-    def key_span(self) -> Span:
-        """Where its key stands."""
-        return self.document.key_span(self.path)
-
-    def items(self) -> Iterator[tuple[str | int, Node]]:
-        """Key or index and part, for each child."""
-        if isinstance(self.children, dict):
-            yield from self.children.items()
-        elif self.children is not None:
-            yield from enumerate(self.children)
-
-    def entry(self, key: str) -> Node | None:
-        """The entry of a mapping; None if there is none or this is no mapping."""
-        return self.children.get(key) if isinstance(self.children, dict) else None
-
-    def at(self, path: DataPath) -> Node:
-        """The part at a path below this one, which must exist."""
-        part = self
-        for step in path:
-            assert part.children is not None, "internal: the path leads into a scalar"
-            part = part.children[step]  # type: ignore[index]
-        return part
-
-    def text(self, key: str) -> str | None:
-        """The text at a key of a mapping; None for anything else."""
-        entry = self.entry(key)
-        return entry.value if entry is not None and isinstance(entry.value, str) else None
-
-    def put(self, data: Data) -> None:
-        """Put data in place of what is written here; all parts of it stand where this one does."""
-        self.value, self.children = None, None
-        if isinstance(data, dict):
-            self.children = {key: self._here(part) for key, part in data.items()}
-        elif isinstance(data, list):
-            self.children = [self._here(part) for part in data]
-        else:
-            self.value = data
-
-    def _here(self, data: Data) -> Node:
-        part = Node(self.document, self.path, None)
-        part.put(data)
-        return part
-
-    def data(self) -> Data:
-        """The part as plain data."""
-        if isinstance(self.children, dict):
-            return {key: part.data() for key, part in self.children.items()}
-        if isinstance(self.children, list):
-            return [part.data() for part in self.children]
-        return self.value
-
-    def copy(self) -> Node:
-        """This part with all below it, free to be changed."""
-        copied = Node(self.document, self.path, self.value)
-        copied.substituted = self.substituted
-        if isinstance(self.children, dict):
-            copied.children = {key: part.copy() for key, part in self.children.items()}
-        elif isinstance(self.children, list):
-            copied.children = [part.copy() for part in self.children]
-        return copied
-
-    def walk(self, path: DataPath = ()) -> Iterator[tuple[DataPath, Node]]:
-        """This part and all below it with their paths, parents first."""
-        yield path, self
-        for key, part in self.items():
-            yield from part.walk((*path, key))
-
-
-def tree_of(document: Document) -> Node:
-    """A document as a tree of its own, free to be changed."""
-    return Node(document, (), document.data)
-
-
-def merge(base: Node, over: Node) -> Node:
+def merge(base: Node, over: Node, key: str = "") -> Node:
     """`base` overlaid with `over`: mappings are merged key by key, all else is replaced.
 
     Keys of the base keep their place, those that only `over` has follow in its order. Of a grammar, `nouns` and `slots`
-    replace each other. Both trees are used up.
+    replace each other. Both trees are used up; `key` is where in their files they stand.
     """
     if not isinstance(base.children, dict) or not isinstance(over.children, dict):
         return over
-    for key, instead in (("nouns", "slots"), ("slots", "nouns")):
-        if over.path[-1:] == ("grammar",) and instead in over.children and key not in over.children:
-            base.children.pop(key, None)
-    for key, part in over.children.items():
-        below = base.children.get(key)
-        base.children[key] = part if below is None else merge(below, part)
+    for former, instead in (("nouns", "slots"), ("slots", "nouns")):
+        if key == "grammar" and instead in over.children and former not in over.children:
+            base.children.pop(former, None)
+    for word, part in over.children.items():
+        below = base.children.get(word)
+        base.children[word] = part if below is None else merge(below, part, word)
     over.children = base.children
     return over
 
@@ -293,7 +167,7 @@ class Library:
         self._roots = [*(root.resolve() for root in roots), self.shipped]
         self.sources: dict[str, Source] = {}
         self._texts = texts or {}
-        self._documents: dict[Path, Document] = {}
+        self._documents: dict[Path, Node] = {}
         self._bytes = 0
 
     def error(
@@ -365,8 +239,8 @@ class Library:
             raise self.error("S507", f"`{text}` matches more than {MAX_FILES} files", asked)
         return [self.resolved(place / name, asked) for name in names]
 
-    def read(self, path: Path, asked: Span | None = None) -> Document:
-        """A file as a document; each is read once.
+    def read(self, path: Path, asked: Span | None = None) -> Node:
+        """A file as a tree of its own, free to be changed; each is read once.
 
         Args:
             path: the file, resolved.
@@ -376,20 +250,20 @@ class Library:
             ScenarioError: what is wrong with the file; S505 and S507 at `asked`.
         """
         if path in self._documents:
-            return self._documents[path]
+            return self._documents[path].copy()
         start = asked or Span(display_name(path), 1, 1)
         if asked is not None:
             self.resolved(path, asked)
         if len(self._documents) == MAX_FILES:
             raise self.error("S507", f"a scenario is made of at most {MAX_FILES} files", start)
-        source = self._texts.get(path) or read_source(path, display_name(path))
+        source = replace(self._texts.get(path) or read_source(path, display_name(path)), path=path)
         self._bytes += len(source.text)
         if self._bytes > MAX_TOTAL_BYTES:
             message = f"the files of a scenario have more than {MAX_TOTAL_BYTES >> 20} MiB together"
             raise self.error("S507", message, start)
         self.sources[source.name] = source
-        self._documents[path] = read_document(source, path=path)
-        return self._documents[path]
+        self._documents[path] = read_document(source)
+        return self._documents[path].copy()
 
 
 def _fits(name: str, pattern: str) -> bool:

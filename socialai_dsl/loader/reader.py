@@ -6,19 +6,17 @@ import math
 import os
 import re
 import stat
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any, Final, NamedTuple, TypeAlias
+from typing import IO, Any, Final, NamedTuple
 
 import yaml
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError
-from socialai_dsl.loader.offsets import Style, source_indices
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style
 
 MAX_FILE_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 32
@@ -171,125 +169,6 @@ def forbidden_character(character: str, span: Span) -> Diagnostic:
     return Diagnostic("S006", message, span)
 
 
-Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
-
-
-@dataclass(frozen=True, slots=True)
-class NodeSpan:
-    """Where one part of a document stands.
-
-    Attributes:
-        key: place of the key, for an entry of a mapping.
-        value: place of the value; as wide as a scalar on one line, else of width 1.
-        style: how the value is written.
-        flow: whether the value stands inside `{ }` or `[ ]`.
-        start: index in the source's text of a scalar's first character, quotes and block header included.
-        end: index behind its last character.
-    """
-
-    key: Span | None
-    value: Span
-    style: Style
-    flow: bool
-    start: int
-    end: int
-
-
-class PositionedData(ABC):
-    """Data whose parts know where they come from; what does not exist is where its nearest ancestor is."""
-
-    data: Data
-
-    @abstractmethod
-    def find(self, path: DataPath) -> tuple[Document, DataPath]:
-        """The document in which the part at `path` was written, and its path there."""
-
-    def part(self, path: DataPath) -> Data:
-        """The part of the data at `path`, which exists."""
-        part: Data = self.data
-        for step in path:
-            part = part[step]  # type: ignore[index]
-        return part
-
-    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
-        """The place of the character `offset` (from 0) of the text at `path`."""
-        document, there = self.find(path)
-        return document.place_in_scalar(there, offset, width)
-
-    def value_span(self, path: DataPath) -> Span:
-        """The place of the value at `path`."""
-        document, there = self.find(path)
-        return document.node(there).value
-
-    def key_span(self, path: DataPath) -> Span:
-        """The place of the key at `path`; of the value, for an item of a list and for the root."""
-        document, there = self.find(path)
-        node = document.node(there)
-        return node.key or node.value
-
-    def in_flow(self, path: DataPath) -> bool:
-        """Whether the part at `path` stands inside { } or [ ]."""
-        return self.node_span(path).flow
-
-    def node_span(self, path: DataPath) -> NodeSpan:
-        """All that is known about the place of the part at `path`."""
-        document, there = self.find(path)
-        return document.node(there)
-
-
-@dataclass(frozen=True, eq=False)
-class Document(PositionedData):
-    """One YAML file as plain data.
-
-    Attributes:
-        source: its text.
-        data: dicts (keys are always text), lists, str, int, float, bool and None.
-        spans: path -> place, for every part.
-        path: the file itself, resolved; None if the text did not come from a file.
-    """
-
-    source: Source
-    data: Data
-    spans: dict[DataPath, NodeSpan] = field(repr=False)
-    path: Path | None = None
-
-    def find(self, path: DataPath) -> tuple[Document, DataPath]:
-        """This document and `path`, shortened until it exists."""
-        path = tuple(path)
-        while path and path not in self.spans:
-            path = path[:-1]
-        return self, path
-
-    def node(self, path: DataPath) -> NodeSpan:
-        """The place of an existing part."""
-        return self.spans[path]
-
-    def place_in_scalar(self, path: DataPath, offset: int, width: int) -> Span:
-        """The place of one character of an existing scalar; the start of anything else."""
-        node = self.node(path)
-        place = node.value
-        if node.style in (Style.MAPPING, Style.SEQUENCE):
-            return place.shifted(0, width)
-        text = self.source.text
-        raw = text[node.start : node.end]
-        if node.style is Style.PLAIN and "\n" not in raw and "\r" not in raw:
-            return place.shifted(min(max(offset, 0), len(raw)), width)
-        value = self.part(path)
-        assert isinstance(value, str), "internal: what is written as a text is read as one"
-        indices = source_indices(text, node.start, node.end, node.style, value)
-        index = indices[min(max(offset, 0), len(indices) - 1)]
-        return self._span_of(node, index, width)
-
-    def _span_of(self, node: NodeSpan, index: int, width: int) -> Span:
-        before = Source("", self.source.text[node.start : index])
-        *_, (breaks, last) = enumerate(before.lines())
-        column = len(last) + (1 if breaks else node.value.column)
-        return Span(node.value.file, node.value.line + breaks, column, width)
-
-
-Scalar: TypeAlias = str | int | float | bool | None
-
-
 class Plain(NamedTuple):
     """The value of a plain word and, if it is refused, the code, message and help line."""
 
@@ -390,7 +269,7 @@ _NOTHING: Final = ("", "~")
 _STEP: Final = re.compile(r"[^.\[\]]+")
 
 
-def value_at(path: DataPath, text: str) -> Data | None:
+def value_at(path: DataPath, text: str) -> Scalar:
     """The value of a plain word where a text may stand; None where YAML's own reading holds.
 
     Args:
@@ -450,25 +329,24 @@ _TAG_DIRECTIVE = re.compile(r"^%TAG\b", re.MULTILINE)
 _STYLES = {None: Style.PLAIN, "": Style.PLAIN} | {s.value: s for s in Style if len(s.value) == 1}
 
 
-def read_document(file: Path | str | Source, name: str | None = None, path: Path | None = None) -> Document:
+def read_document(file: Path | str | Source, name: str | None = None) -> Node:
     """One YAML document as plain data with positions.
 
     Args:
         file: a path, or text that is there already.
         name: how messages call the file; by default its path relative to the working directory.
-        path: the file that text came from, if `file` is a source.
 
     Raises:
         ScenarioError: everything that is wrong with the file as YAML (S001 to S007), in one go as far as
             the text can be followed.
     """
     if isinstance(file, Source):
-        return _parse(checked(file), path)
+        return _parse(checked(file))
     path = Path(file)
-    return _parse(read_source(path, name or display_name(path)), path.resolve())
+    return _parse(replace(read_source(path, name or display_name(path)), path=path.resolve()))
 
 
-def _parse(source: Source, path: Path | None) -> Document:
+def _parse(source: Source) -> Node:
     builder = _Builder(source)
     try:
         builder.refuse_many_directives()
@@ -480,7 +358,7 @@ def _parse(source: Source, path: Path | None) -> Document:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         builder.found.add(explain(error, source))
     builder.found.raise_errors({source.name: source})
-    return builder.document(path)
+    return builder.root
 
 
 def _events(text: str) -> Iterator[Any]:
@@ -501,11 +379,13 @@ class _Frame:
 
     __slots__ = ("container", "first_lines", "flow", "is_key", "key", "key_span", "path")
 
-    def __init__(self, container: dict[str, Data] | list[Data], path: DataPath, flow: bool) -> None:
+    def __init__(
+        self, container: dict[str, Node] | list[Node], path: DataPath, flow: bool, is_key: bool
+    ) -> None:
         self.container = container
         self.path = path
         self.flow = flow
-        self.is_key = False
+        self.is_key = is_key
         self.key: str | None = None
         self.key_span: Span | None = None
         self.first_lines: dict[str, int] = {}
@@ -516,13 +396,17 @@ class _Frame:
 
 
 class _Builder:
-    """Takes events one by one; nothing in here is recursive."""
+    """Takes events one by one; nothing in here is recursive.
+
+    Attributes:
+        found: what is wrong with the document.
+        root: its tree.
+    """
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.found = DiagnosticBag()
-        self._spans: dict[DataPath, NodeSpan] = {}
-        self._data: Data = None
+        self.root = Node(NodeSpan(source, None, source.span(1, 1), Style.PLAIN, False, 0, 0))
         self._stack: list[_Frame] = []
         self._events = 0
         self._documents = 0
@@ -551,12 +435,6 @@ class _Builder:
             line = self.source.text.count("\n", 0, found[0].start()) + 1
             self._refuse_directives(self.source.span(line, 1))
             raise _LimitError
-
-    def document(self, path: Path | None) -> Document:
-        if not self._spans:
-            start = self.source.span(1, 1)
-            self._spans[()] = NodeSpan(None, start, Style.PLAIN, False, 0, 0)
-        return Document(self.source, self._data, self._spans, path)
 
     def _span(self, event: Any) -> Span:
         start, end = event.start_mark, event.end_mark
@@ -653,22 +531,27 @@ class _Builder:
         assert frame.key is not None, "internal: a value without a key"
         return (*frame.path, frame.key)
 
-    def _value(self, value: Data, event: Any, style: Style) -> DataPath:
-        """Put a value where the next one belongs and return its path."""
-        start, end = event.start_mark, event.end_mark
-        span = self._span(event) if style not in (Style.MAPPING, Style.SEQUENCE) else self._start(event)
+    def _value(self, value: Scalar, event: Any, style: Style) -> None:
+        """Put a scalar where the next value belongs."""
+        self._put(self._node(self._span(event), event, style, value))
+
+    def _node(self, place: Span, event: Any, style: Style, value: Scalar = None) -> Node:
+        """What an event begins, for the place where the next value belongs."""
+        key, flow = (self._stack[-1].key_span, self._stack[-1].flow) if self._stack else (None, False)
+        start, end = event.start_mark.index, event.end_mark.index
+        return Node(NodeSpan(self.source, key, place, style, flow, start, end, value), value)
+
+    def _put(self, node: Node) -> None:
+        """Put a part where the next value belongs."""
         if not self._stack:
-            self._data = value
-            self._spans[()] = NodeSpan(None, span, style, False, start.index, end.index)
-            return ()
-        path, frame = self._path(), self._stack[-1]
+            self.root = node
+            return
+        frame = self._stack[-1]
         if isinstance(frame.container, list):
-            frame.container.append(value)
+            frame.container.append(node)
         else:
-            frame.container[str(path[-1])] = value
-        self._spans[path] = NodeSpan(frame.key_span, span, style, frame.flow, start.index, end.index)
+            frame.container[str(frame.key)] = node
         frame.key = frame.key_span = None
-        return path
 
     def _start(self, event: Any) -> Span:
         mark = event.start_mark
@@ -680,7 +563,7 @@ class _Builder:
     def _sequence(self, event: Any) -> None:
         self._open([], event, Style.SEQUENCE)
 
-    def _open(self, container: dict[str, Data] | list[Data], event: Any, style: Style) -> None:
+    def _open(self, container: dict[str, Node] | list[Node], event: Any, style: Style) -> None:
         self._refuse_properties(event)
         if len(self._stack) == MAX_DEPTH:
             self._stop(f"the file is nested more than {MAX_DEPTH} levels deep", self._start(event))
@@ -689,9 +572,10 @@ class _Builder:
         if frame is not None and is_key:
             self._error("S001", "not YAML: a key is a word, not a list or a mapping", self._start(event))
             frame.key, frame.key_span = "", None
-        opened = _Frame(container, self._value(container, event, style), bool(event.flow_style))
-        opened.is_key = is_key
-        self._stack.append(opened)
+        path, node = self._path(), self._node(self._start(event), event, style)
+        node.children = container
+        self._put(node)
+        self._stack.append(_Frame(container, path, bool(event.flow_style), is_key))
 
     def _end(self, event: Any) -> None:
         closed = self._stack.pop()

@@ -12,7 +12,7 @@ from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
 from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.terms import Line, Pattern
-from socialai_dsl.source import Positions
+from socialai_dsl.source import Node
 from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
 
 
@@ -47,7 +47,7 @@ def shared_space(
     names: Sequence[str],
     members: Sequence[CheckedScenario],
     actions: tuple[str, ...],
-    places: Positions,
+    places: Node,
     bag: DiagnosticBag,
 ) -> SharedSpace:
     """The action space of a suite; reports S401 for what a member needs and a written grammar cannot say.
@@ -88,7 +88,7 @@ def shared_space(
 
 
 def _check_looks(
-    names: Sequence[str], members: Sequence[CheckedScenario], places: Positions, bag: DiagnosticBag
+    names: Sequence[str], members: Sequence[CheckedScenario], places: Node, bag: DiagnosticBag
 ) -> None:
     """Report looks whose words differ from member to member: all members are seen in the same channels."""
     known: dict[str, tuple[str, tuple[str, ...]]] = {}
@@ -134,7 +134,7 @@ def _concatenated(
 
 
 def _check_sayable(
-    space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Positions, bag: DiagnosticBag
+    space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Node, bag: DiagnosticBag
 ) -> None:
     sayable = dict(_live(space, number, member))
     live = set(sayable.values())
