@@ -62,7 +62,7 @@ def check_scenario(
             tell()
     except KeyboardInterrupt:
         effort.clock.interrupt()
-    report.interrupted, report.in_time = effort.clock.interrupted, not effort.clock.is_over
+    report.interrupted = effort.clock.interrupted
     report.complete = True
     tell()
     return report

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
 from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
-from socialai_dsl.loader.library import yaml_files
+from socialai_dsl.loader.reader import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, literals, model_at
 from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
 from socialai_dsl.schema.scenario import CastGroup

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.loader.library import looks_like_path
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of

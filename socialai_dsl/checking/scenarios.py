@@ -16,7 +16,7 @@ from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import Data, Node
-from socialai_dsl.vocabulary import PRIMITIVES
+from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
 
@@ -422,14 +422,10 @@ def _others(resolved: ResolvedFile) -> Iterator[tuple[str, str]]:
         if isinstance(choices, dict):
             yield from ((name, label) for label, value in choices.items() if default not in (label, value))
         elif isinstance(choices, list):
-            texts = ((_written(value), value) for value in choices if not _same(value, default))
+            texts = ((spelt(value), value) for value in choices if not _same(value, default))
             yield from ((name, text) for text, value in texts if _same(read_plain(text).value, value))
 
 
 def _same(value: Data, other: Data) -> bool:
     """Whether two values are one: 1 is not true."""
     return value == other and isinstance(value, bool) is isinstance(other, bool)
-
-
-def _written(value: Data) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -20,7 +20,7 @@ from socialai_dsl.compiler.assembler import (
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
-from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole, plans
+from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, Chosen, sizes
@@ -124,7 +124,7 @@ class Homes:
 
 def _named(checked: CheckedScenario) -> Iterator[int]:
     """What a `reset` names, and what may lie in that."""
-    for plan in plans(checked):
+    for plan in checked.causing:
         for effect in plan.causes:
             if effect.name == "reset":
                 for target in effect.entities:

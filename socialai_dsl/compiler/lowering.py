@@ -210,8 +210,7 @@ class _FrameCompiler:
         self.counters = {name: self._counter(name) for name in self._names()}
         self.once = {
             rule.name: shared.registers.add(f"{frame.member}.fired.{rule.name}", BOOL)
-            for state in frame.states
-            for rule in (*state.first, *state.then)
+            for rule in frame.rules
             if rule.once
         }
         self.aims = {
@@ -236,9 +235,7 @@ class _FrameCompiler:
         return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
     def _names(self) -> list[str]:
-        if self.frame.steps:
-            return [step.name for step in self.frame.steps]
-        return [rule.name for state in self.frame.states for rule in (*state.first, *state.then)]
+        return [one.name for one in self.frame.steps or self.frame.rules]
 
     def _counter(self, name: str) -> int:
         self.shared.rules.append(name)

@@ -11,6 +11,7 @@ from typing import Final
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.source import Data, DataPath, Node
+from socialai_dsl.vocabulary import spelt
 
 NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")
 """Keys of a value in a tree; every other key is a parameter below it."""
@@ -40,11 +41,6 @@ class Leaf:
     def name(self) -> str:
         """Its name: `introduction=ask,problem=boxes`."""
         return ",".join(f"{parameter}={label}" for parameter, label in self.labels.items())
-
-
-def label_of(value: Data) -> str:
-    """How a value of a list is called, and written behind `?`."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def leaves_of(tree: Data, places: Node, found: DiagnosticBag) -> tuple[Leaf, ...]:
@@ -108,7 +104,7 @@ def _values(parameter: str, values: Data, path: DataPath, places: Node, found: D
     labels: list[tuple[str, DataPath, Data]] = (
         [(label, (*path, label), node) for label, node in values.items()]
         if isinstance(values, dict)
-        else [(label_of(value), (*path, i), {}) for i, value in enumerate(_listed(values))]
+        else [(spelt(value), (*path, i), {}) for i, value in enumerate(_listed(values))]
     )
     seen: set[str] = set()
     for label, place, node in labels:
@@ -314,7 +310,7 @@ def _swept(suite: ResolvedFile, place: DataPath, split: str | None, found: Diagn
         return
     for combination in combinations:
         scenario = member.scenario
-        labels = {path: label_of(_listed(values[path])[i]) for path, i in combination}
+        labels = {path: spelt(_listed(values[path])[i]) for path, i in combination}
         try:
             for path, i in combination:
                 scenario = scenario.with_value(path, suite.tree.at(("sweep", name, path, i)))
@@ -440,7 +436,7 @@ def _has(leaf: Leaf, wanted: Mapping[str, Data]) -> bool:
 
 
 def _labels(values: Data) -> list[str]:
-    return [label_of(value) for value in (values if isinstance(values, list) else [values])]
+    return [spelt(value) for value in (values if isinstance(values, list) else [values])]
 
 
 def _are_known(

@@ -147,13 +147,11 @@ class Edit:
         verb: what was done.
         path: to which path of the scenario, as written.
         span: where the patch says so.
-        removed: where what was removed or replaced had been written, if there was something.
     """
 
     verb: Literal["remove", "set", "add"]
     path: str
     span: Span
-    removed: Span | None = None
 
 
 def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
@@ -200,7 +198,7 @@ def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
         place = _existing(root, item.value, item.value_span(), found)
         if place is None or place.node is None:
             continue
-        edit = Edit("remove", item.value, item.value_span(), place.node.key_span())
+        edit = Edit("remove", item.value, item.value_span())
         if any(place.node is earlier.node for earlier, _ in places):
             found.add(Diagnostic("S501", f"`{item.value}` is removed twice", edit.span))
         else:
@@ -227,7 +225,7 @@ def _set(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]
         place.parent.children[str(place.key)] = value
     elif isinstance(place.parent.children, list):
         place.parent.children[int(place.key)] = value
-    return [Edit("set", path, span, place.node.key_span() if place.node else None)]
+    return [Edit("set", path, span)]
 
 
 def _add(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:

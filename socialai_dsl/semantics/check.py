@@ -489,15 +489,12 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
-        asked = probes(resolver)
+        asked = probes(resolver) if self._scenario.probes else ()
         for rule in rules:
             self._look_at_size(rule)
         for plan in plans:
-            for state in plan.states:
-                for one in (*state.first, *state.then):
-                    self._look_at_size(one)
-            for step in plan.steps:
-                self._look_at_size(step)
+            for one in plan.causing:
+                self._look_at_size(one)
         if findings.bag.has_errors:
             return None
         for plan in plans:

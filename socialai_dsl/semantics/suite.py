@@ -9,9 +9,9 @@ from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.resolver import texts_of
-from socialai_dsl.semantics.terms import Line, Pattern
+from socialai_dsl.semantics.terms import Pattern
 from socialai_dsl.source import Node
 from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
 
@@ -170,10 +170,5 @@ def _scripted(member: CheckedScenario) -> Iterator[str]:
     """What the agent's own frame says."""
     for frame in member.frames:
         if frame.entity == 0:
-            yield from (text for line in _lines(frame) for text in texts_of(line))
-
-
-def _lines(frame: FramePlan) -> Iterator[Line]:
-    rules = (rule for state in frame.states for rule in (*state.first, *state.then))
-    said = (*(rule.say for rule in rules), *(step.say for step in frame.steps))
-    yield from (line for line in said if line is not None)
+            said = (one.say for one in frame.causing)
+            yield from (text for line in said if line is not None for text in texts_of(line))

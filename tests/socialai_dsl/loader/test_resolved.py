@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import library, resolved
+from socialai_dsl.loader import reader, resolved
 from socialai_dsl.loader.members import check_splits, members_of
 from socialai_dsl.loader.reader import MAX_CHAIN, MAX_FILES
 from socialai_dsl.loader.resolved import resolve, shipped_names
@@ -55,7 +55,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
     for name, text in FILES.items():
         write_file(name, text)
-    for module in (library, resolved):
+    for module in (reader, resolved):
         monkeypatch.setattr(module, "shipped_folder", lambda: tmp_path / "shipped")
     monkeypatch.chdir(tmp_path / "user")
     return write_file
@@ -484,8 +484,8 @@ def test_shipped_names_leave_out_variants_of_any_scenario() -> None:
 
 def test_the_shipped_folder_is_beside_or_in_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    package = Path(library.__file__).parents[1]
-    assert library.shipped_folder() in (package / "scenarios", package.parent / "scenarios")
+    package = Path(reader.__file__).parents[1]
+    assert reader.shipped_folder() in (package / "scenarios", package.parent / "scenarios")
 
 
 def test_resolving_is_quick() -> None:
