@@ -258,14 +258,12 @@ class _FrameCompiler:
         """The address of what rules of `first` do after the body action that they have chosen."""
         to = self._expressions(Facts())
         for rule in self.later.rules:
-            following = Label()
             mark = to.block.taken
             to.block.span = rule.span
-            to.block.test(Op.IF_EQ, *self.later.is_pending(rule), following)
-            self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
-            to.block.span = rule.span
-            self._go(to, rule, follow=False)
-            to.block.bind(following)
+            with to.block.when(Op.IF_EQ, *self.later.is_pending(rule)):
+                self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+                to.block.span = rule.span
+                self._go(to, rule, follow=False)
             to.block.release(mark)
         if self.later.rules:
             to.block.halt()  # where none of them is pending
@@ -437,28 +435,27 @@ class _FrameCompiler:
 
         Where a round does not begin, on to its exit; where the entry does not, on to the label that is returned.
         """
-        block, left, inside = to.block, Label(), Label()
+        block, left = to.block, Label()
         when = self.frame.steps[k].when
         if when is None and not any(nested.when or nested.going or nested.until for nested in begun):
             return left
-        block.test(Op.IF_EQ, self.clock, constant(0), inside)
-        for i, nested in enumerate(begun):
-            begins = Label()
-            for inner in begun[i + 1 :]:  # else a round of these begins, within one of the others
-                if inner.rounds > 1:
-                    block.test(Op.IF_EQ, self.rounds[inner.register], constant(0), begins)
-            another = Label()
-            if nested.rounds > 1:
-                block.test(Op.IF_EQ, self.rounds[nested.register], constant(0), another)
-            self._enter(to, nested, exits[id(nested)])
-            if nested.rounds > 1:
-                block.skip(begins)
-                block.bind(another)
-                self._unless_over(to, nested, exits[id(nested)])
-            block.bind(begins)
-        if when is not None:
-            to.sited_condition(when, left)
-        block.bind(inside)
+        with block.when(Op.IF_EQ, self.clock, constant(0)):
+            for i, nested in enumerate(begun):
+                begins = Label()
+                for inner in begun[i + 1 :]:  # else a round of these begins, within one of the others
+                    if inner.rounds > 1:
+                        block.test(Op.IF_EQ, self.rounds[inner.register], constant(0), begins)
+                another = Label()
+                if nested.rounds > 1:
+                    block.test(Op.IF_EQ, self.rounds[nested.register], constant(0), another)
+                self._enter(to, nested, exits[id(nested)])
+                if nested.rounds > 1:
+                    block.skip(begins)
+                    block.bind(another)
+                    self._unless_over(to, nested, exits[id(nested)])
+                block.bind(begins)
+            if when is not None:
+                to.sited_condition(when, left)
         return left
 
     def _be_in(self, to: Expressions, entry: int, *asked: object) -> bool:
