@@ -28,7 +28,7 @@ def different_programs(count: int) -> dict[str, str]:
 
 
 def _candidates() -> Iterator[str]:
-    from socialai_dsl.loader.library import shipped_folder
+    from socialai_dsl.loader.reader import shipped_folder
 
     folder = shipped_folder()
     nested = [path.relative_to(folder).with_suffix("") for path in sorted(folder.rglob("*/*.yaml"))]

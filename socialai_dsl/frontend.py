@@ -29,12 +29,11 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import Data, display_name, read_document
+from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.source import Source, Span, Style
 
 __all__ = [
     "CheckResult",
@@ -192,33 +191,18 @@ _GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")
 
 def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
     """A warning for each text that is written without quotes and seems to go on behind a `#`."""
-    for path, text in _texts(resolved.data, ()):
-        node = resolved.node_span(path)
-        document, _ = resolved.find(path)
-        comment = _GLUED.match(document.source.text, node.end) if node.style is Style.PLAIN else None
-        if comment is None:
+    for path, node in resolved.tree.walk():
+        span, text = node.span, node.value
+        if not isinstance(text, str) or span.style is not Style.PLAIN:
             continue
-        width = len(comment[1])
-        place = Span(
-            node.value.file, node.value.line, node.value.column + comment.start(1) - node.start, width
-        )
+        key = next((step for step in reversed(path) if isinstance(step, str)), "")
+        comment = _GLUED.match(node.source.text, span.end)
+        if comment is None or (key not in _SPOKEN and "with" not in path[-2:-1]):
+            continue
+        place = span.value.shifted(comment.start(1) - span.start, len(comment[1]))
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
         hint = f'write "{text} {comment[1]}" if it belongs to the text, else a blank behind the `#`'
         yield Diagnostic("W009", message, place, Severity.WARNING, hint)
-
-
-def _texts(part: Data, path: DataPath) -> Iterator[tuple[DataPath, str]]:
-    """What is said, heard or called, with its place."""
-    if isinstance(part, dict):
-        for key, value in part.items():
-            yield from _texts(value, (*path, key))
-    elif isinstance(part, list):
-        for i, value in enumerate(part):
-            yield from _texts(value, (*path, i))
-    elif isinstance(part, str):
-        key = next((step for step in reversed(path) if isinstance(step, str)), "")
-        if key in _SPOKEN or "with" in path[-2:-1]:
-            yield path, part
 
 
 SUFFIXES = (".yaml", ".yml")
@@ -275,7 +259,7 @@ def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded
         what = "an abstract scenario, which others build on"
         if kind != "scenario":
             what = f"a file of the kind `{kind}`"
-        span = result.resolved.key_span((kind,))
+        span = result.resolved.tree.key_span((kind,))
         message = f"this is {what}; only a scenario can be run"
         raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
     return loaded
@@ -305,7 +289,7 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
         assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
         kind = result.resolved.kind
         message = f"this is a file of the kind `{kind}`, not an experiment"
-        span = result.resolved.key_span((kind,))
+        span = result.resolved.tree.key_span((kind,))
         raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
     return result.experiment
 
@@ -403,7 +387,7 @@ def _check_played(
     played: dict[str, Loaded] = {}
     for name, written, place in experiment.named():
         result = check(name)
-        span = experiment.resolved.value_span(place)
+        span = experiment.resolved.tree.value_span(place)
         if not result.has_errors:
             loaded = _loaded(result)
             if loaded is not None:

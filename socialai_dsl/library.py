@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from socialai_dsl.loader.reader import Data, read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.schema.scenario import Model, UtteranceGrammar, Word
 from socialai_dsl.semantics.entities import Prelude
 from socialai_dsl.semantics.terms import COLOR, ObjectType
+from socialai_dsl.source import Data
 
 _FOLDER = Path(__file__).parent / "prelude"
 
@@ -116,7 +117,4 @@ def shared_grammars() -> dict[str, Data]:
     """The grammars that a scenario can name, as plain data."""
     document = read_document(_FOLDER / "grammars.yaml")
     GrammarLibrary.model_validate(document.data)
-    assert isinstance(document.data, dict), "internal: a library is a mapping"
-    grammars = document.data["grammars"]
-    assert isinstance(grammars, dict), "internal: a library has its model"
-    return dict(grammars)
+    return {str(name): grammar.data for name, grammar in document.at(("grammars",)).items()}

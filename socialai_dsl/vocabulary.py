@@ -47,6 +47,13 @@ def words(text: str) -> list[str]:
     return _WORD.findall(text.lower())
 
 
+def spelt(value: object) -> str:
+    """A plain value as YAML and people write it."""
+    if value is None:
+        return "nothing"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def is_plain(text: str, marks: str = "'-.") -> bool:
     """Whether a text is words alone: letters and digits, with blanks and these marks around them."""
     return "".join(text.translate(dict.fromkeys(map(ord, marks))).split()).isalnum()

@@ -94,7 +94,7 @@ def test_the_page_shows_every_file() -> None:
 def test_success_is_knowable_unless_a_recipe_says_otherwise(path: Path) -> None:
     loaded = socialai_dsl.load(path)
     assert isinstance(loaded, socialai_dsl.LoadedScenario)
-    place = loaded.resolved.key_span(("outcome",))
+    place = loaded.resolved.tree.key_span(("outcome",))
     (plan,) = (plan for plan in by_default(loaded, place) if plan.kind == "knowable")
     assert plan.expected is (path.stem != "hidden_information_silent")
     scripted = loaded if any(frame.entity == 0 for frame in loaded.checked.frames) else None

@@ -13,7 +13,7 @@ import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.evaluation import evaluate, players
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.shipped import IDS
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
 from trainer import checkpoint as checkpoints

@@ -29,7 +29,7 @@ def check_scenario(
         deep: also try what success takes.
         say: takes the lines of the report as they come.
     """
-    place = loaded.resolved.key_span(("outcome",))
+    place = loaded.resolved.tree.key_span(("outcome",))
     report = ScenarioReport(called, effort.rooms, effort.seed, place)
     said = 0
 
@@ -62,7 +62,7 @@ def check_scenario(
             tell()
     except KeyboardInterrupt:
         effort.clock.interrupt()
-    report.interrupted, report.in_time = effort.clock.interrupted, not effort.clock.is_over
+    report.interrupted = effort.clock.interrupted
     report.complete = True
     tell()
     return report

@@ -110,10 +110,7 @@ def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, Part]]:
         for number, state in enumerate(frame.states):
             name = f"{frame.member}.{frame.frame}.{state.name}"
             yield (f"{frame.member}.frame", number), Part("state", name, state.span)
-        for plan in frame.states:
-            for rule in (*plan.first, *plan.then):
-                yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
-    for rule in checked.rules:
+    for rule in (*(rule for frame in checked.frames for rule in frame.rules), *checked.rules):
         yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
     for outcome in checked.outcomes:
         yield f"outcomes {outcome.name}", Part("outcome", outcome.name, outcome.condition.span)

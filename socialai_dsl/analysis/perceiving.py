@@ -304,12 +304,9 @@ def _only(value: Mapping[str, Any]) -> Any:
 def _draws_itself(checked: CheckedScenario) -> bool:
     """Whether the script itself draws something, which then also differs when later draws do."""
     for frame in checked.frames:
-        rules = [rule for state in frame.states for rule in (*state.first, *state.then)]
-        activities = [state.activity for state in frame.states] + [step.activity for step in frame.steps]
-        activities += [rule.do for rule in rules if rule.do is not None]
         if frame.entity == 0 and (
-            any(rule.chance is not None for rule in rules)
-            or any(activity.name == "choose" for activity in activities)
+            any(rule.chance is not None for rule in frame.rules)
+            or any(activity.name == "choose" for activity in frame.activities)
             or any(isinstance(part, Quantified) and part.op == "pick" for part in walk(frame))
         ):
             return True

@@ -25,7 +25,7 @@ class ScenarioReport:
         outcomes: where the outcomes are written.
         tried: its properties with what was found. coverage: what of it never happens, if that was tried.
         depth: what success takes, if that was tried.
-        complete: whether nothing more comes. interrupted: whether somebody stopped it. in_time: whether time was left.
+        complete: whether nothing more comes. interrupted: whether somebody stopped it.
     """
 
     scenario: str
@@ -37,7 +37,6 @@ class ScenarioReport:
     depth: "Depth | None" = None
     complete: bool = False
     interrupted: bool = False
-    in_time: bool = True
 
     def findings(self) -> Iterator[Diagnostic]:
         """Failures as errors, undecided claims and parts that never happen as warnings, each at its place."""

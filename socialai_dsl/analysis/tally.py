@@ -98,7 +98,7 @@ def parts_of(checked: CheckedScenario) -> Iterator[Part]:
                 yield _step(frame, number)
         for number, state in enumerate(frame.states):
             yield _state(frame, number)
-            yield from (_rule(frame, rule) for rule in (*state.first, *state.then))
+            yield from (_rule(frame, rule) for rule in state.rules)
     yield from (Part(rule.span, "rule", rule.name) for rule in checked.rules)
     yield from (Part(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
 
@@ -202,7 +202,7 @@ class _Frames:
             for number, place in enumerate(places.values()):
                 times[place] += int(entered[number])
             for state in frame.states:
-                for rule in (*state.first, *state.then):
+                for rule in state.rules:
                     fired = counters[next(numbers)]
                     times[_rule(frame, rule)] += fired
                     if aim := rule.goto or rule.goto_now:

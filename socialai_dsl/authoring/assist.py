@@ -12,8 +12,7 @@ from pydantic import BaseModel
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
 from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
-from socialai_dsl.loader.library import yaml_files
-from socialai_dsl.loader.reader import Data, Document
+from socialai_dsl.loader.reader import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, literals, model_at
 from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
 from socialai_dsl.schema.scenario import CastGroup
@@ -26,7 +25,7 @@ from socialai_dsl.semantics.signatures import (
     VALUES,
     Signature,
 )
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import Data, DataPath, Node
 
 _FILES: Final[dict[str, type[BaseModel]]] = {
     "scenario": ScenarioFile,
@@ -75,7 +74,7 @@ class Offer:
 # -- hover ---------------------------------------------------------------------------------------------------------
 
 
-def explain(document: Document, data: Data, line: int, column: int) -> tuple[str, Cursor] | None:
+def explain(document: Node, data: Data, line: int, column: int) -> tuple[str, Cursor] | None:
     """The meaning of the word at a position, as Markdown, and its range; None if it is unknown.
 
     Args:
@@ -147,7 +146,7 @@ def usage(signature: Signature) -> str:
 # -- definitions ---------------------------------------------------------------------------------------------------
 
 
-def declaration(document: Document, data: Data, line: int, column: int) -> DataPath | Path | None:
+def declaration(document: Node, data: Data, line: int, column: int) -> DataPath | Path | None:
     """Where the word at a position is declared: a path in `data`, or a file; None if nowhere."""
     cursor = word_at(document, line, column)
     if cursor is None:
@@ -161,13 +160,14 @@ def declaration(document: Document, data: Data, line: int, column: int) -> DataP
     return next((name.path for name in names if name.word == word), None)
 
 
-def _named_file(document: Document, cursor: Cursor) -> Path | None:
+def _named_file(document: Node, cursor: Cursor) -> Path | None:
     key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
     value = part_at(document.data, cursor.path)
-    if document.path is None or cursor.is_key or key not in _NAMING_FILES or not isinstance(value, str):
+    folder = document.source.path.parent if document.source.path is not None else None
+    if folder is None or cursor.is_key or key not in _NAMING_FILES or not isinstance(value, str):
         return None
     name = value.partition("+")[0].partition("?")[0]
-    for candidate in (document.path.parent / name, document.path.parent / f"{name}.yaml"):
+    for candidate in (folder / name, folder / f"{name}.yaml"):
         if candidate.is_file() and len(cursor.path) <= 4:
             return candidate
     return None

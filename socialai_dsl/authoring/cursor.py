@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import Data, Document, read_document
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.source import Data, DataPath, Node, Source, Span, Style
 
 _HERE: Final = "zzz_here_zzz"
 _WORD: Final = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*")
@@ -39,7 +38,7 @@ class Cursor:
     span: Span
 
 
-def word_at(document: Document, line: int, column: int) -> Cursor | None:
+def word_at(document: Node, line: int, column: int) -> Cursor | None:
     """The word at a position, from 1, of a document; None if there is none."""
     text = document.source.line(line)
     match = next((m for m in _WORD.finditer(text) if m.start() < column <= m.end() + 1), None)
@@ -47,8 +46,8 @@ def word_at(document: Document, line: int, column: int) -> Cursor | None:
         return None
     span = document.source.span(line, match.start() + 1, len(match.group()))
     index = sum(len(part) + 1 for part in document.source.text.split("\n")[: line - 1]) + match.start()
-    for path, node in document.spans.items():
-        key = node.key
+    for path, part in document.walk():
+        node, key = part.span, part.span.key
         if key is not None and key.line == line and key.column <= span.column < key.column + key.width:
             before = text[key.column - 1 : match.start()]
             return Cursor(path, True, match.group(), before, document.data, span)

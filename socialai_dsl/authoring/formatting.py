@@ -14,8 +14,8 @@ from typing import Any, Final
 import yaml
 
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import Document, read_document
-from socialai_dsl.source import Source
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.source import Node, Source
 
 _INDENT: Final = 2
 _BREAK: Final = re.compile(r"\r\n|\r")
@@ -34,9 +34,9 @@ def formatted(source: Source) -> str:
     return text
 
 
-def _meaning(document: Document) -> tuple[Any, ...]:
+def _meaning(document: Node) -> tuple[Any, ...]:
     """What formatting must keep: the data, how each part is written, the comments."""
-    styles = {path: node.style for path, node in document.spans.items()}
+    styles = {path: node.span.style for path, node in document.walk()}
     return repr(document.data), styles, [comment.text for comment in comments_of(document)]
 
 

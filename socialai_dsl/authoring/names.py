@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from socialai_dsl.loader.reader import Data
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import Data, DataPath
 
 KINDS: Final = {
     "cast": "a member of the cast",

@@ -16,9 +16,9 @@ from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.loader.reader import Document, display_name, read_document
+from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import Node, Source, Span
 
 _SEVERITIES: Final = {
     Severity.ERROR: lsp.DiagnosticSeverity.Error,
@@ -80,12 +80,13 @@ class Server(LanguageServer):
 
     def source(self, uri: str) -> Source:
         """The text of a file as it is in the editor."""
-        return Source(display_name(path_of(uri)), self.workspace.get_text_document(uri).source)
+        path = path_of(uri)
+        return Source(display_name(path), self.workspace.get_text_document(uri).source, path)
 
-    def document(self, uri: str) -> Document | None:
+    def document(self, uri: str) -> Node | None:
         """The file as it is in the editor; None if it is not YAML."""
         try:
-            return read_document(self.source(uri), path=path_of(uri))
+            return read_document(self.source(uri))
         except ScenarioError:
             return None
 
@@ -172,15 +173,15 @@ def definition(ls: Server, params: lsp.DefinitionParams) -> lsp.Location | None:
     if document is None:
         return None
     resolved = ls.resolved(uri)
-    holder = resolved if resolved is not None else document
+    holder = resolved.tree if resolved is not None else document
     there = assist.declaration(document, holder.data, *ls.place(uri, params.position))
     if there is None:
         return None
     if isinstance(there, Path):
         start = lsp.Position(0, 0)
         return lsp.Location(from_fs_path(str(there)) or "", lsp.Range(start, start))
-    written, _ = holder.find(there)
-    target = from_fs_path(str(written.path)) if written.path is not None else uri
+    path = holder.nearest(there).source.path
+    target = from_fs_path(str(path)) if path is not None else uri
     target = uri if target is None or path_of(target) == path_of(uri) else target
     return lsp.Location(target, ls.range(target, holder.key_span(there)))
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.loader.library import looks_like_path
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
@@ -58,7 +57,7 @@ class LoadedExperiment:
         place = cell.places[key]
         if key == "scenario":
             return place
-        tests = self.resolved.part(place)
+        tests = self.resolved.tree.at(place).data
         assert isinstance(tests, list), "internal: the shape of tests was checked"
         return (*place, list(cell.tests).index(written)) if len(tests) == len(cell.tests) else place
 
@@ -76,7 +75,7 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
 
     `bag` takes the findings, after which the experiment serves only to check the rest of it.
     """
-    shaped = model_of(Experiment, resolved.data, resolved, bag, parameters=False)
+    shaped = model_of(Experiment, resolved.tree, bag, parameters=False)
     if shaped.model is None:
         return None
     experiment = shaped.model
@@ -84,9 +83,9 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
         near = did_you_mean(experiment.profile, experiment.profiles)
         message = f"there is no profile `{experiment.profile}`"
         hint = None if near else "the file's profiles are " + (", ".join(experiment.profiles) or "none")
-        bag.error("S201", message, resolved.value_span(("profile",)), suggestion=near, hint=hint)
+        bag.error("S201", message, resolved.tree.value_span(("profile",)), suggestion=near, hint=hint)
     cells = {
-        profile: cells_of(experiment, profile, shaped.places, bag, whole=not shaped.lost)
+        profile: cells_of(experiment, profile, shaped.tree, bag, whole=not shaped.lost)
         for profile in (None, *experiment.profiles)
     }
     for own in cells.values():
@@ -108,7 +107,7 @@ def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: Diagnostic
         )
         folder = display_name(resolved.path.parent)
         message = f"there is no checkpoint `{cell.agent}` in {folder}"
-        bag.error("S703", message, resolved.value_span(cell.places["agent"]), suggestion=near, hint=hint)
+        bag.error("S703", message, resolved.tree.value_span(cell.places["agent"]), suggestion=near, hint=hint)
 
 
 _NAMES: Final = {"net": NETS, "bonus": ("none", "auto", "lang", "cell"), "guide": ("none", "script")}
@@ -123,5 +122,5 @@ def _check_names(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticB
                 continue
             near = did_you_mean(name, shipped)
             hint = None if near else f"one of {', '.join(shipped)}, or mine:{option.title()}"
-            span = resolved.value_span(cell.places[option])
+            span = resolved.tree.value_span(cell.places[option])
             bag.error("S103", f"`{name}` is not a word for `{option}`", span, suggestion=near, hint=hint)

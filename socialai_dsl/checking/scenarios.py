@@ -9,14 +9,14 @@ from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
-from socialai_dsl.loader.library import Node
-from socialai_dsl.loader.reader import Data, read_plain
+from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.vocabulary import PRIMITIVES
+from socialai_dsl.source import Data, Node
+from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
 
@@ -44,7 +44,7 @@ def put_parameters(
             node.substituted = True
         elif name not in declared:  # without a default, it is reported where it is declared
             near = did_you_mean(name, values)
-            span = node.document.locate(node.path, 0, len(name) + 1)
+            span = node.locate(width=len(name) + 1)
             bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
 
 
@@ -90,7 +90,7 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
     labels = list(map(str, choices)) if isinstance(choices, dict | list) else [str(default)]
     if str(default) not in labels:
         near = did_you_mean(str(default), labels)
-        span = resolved.value_span(("params", name, "default"))
+        span = resolved.tree.value_span(("params", name, "default"))
         hint = None if near else "one of " + ", ".join(labels)
         message = f"the default of `{name}` is none of its values"
         bag.error("S206", message, span, suggestion=near, hint=hint)
@@ -172,7 +172,7 @@ def _keep_one_frame(name: str, member: Node, keys: dict[str, Node], bag: Diagnos
         given = keys.get(key)
         if given is None or not isinstance(given.children, list):
             continue
-        words = [str(item.data()) for item in given.children]
+        words = [str(item.data) for item in given.children]
         if len(words) > 1:
             message = f"`{words[0]}` and `{words[1]}` would both move `{name}`: a member follows one frame"
             hint = "join them in one frame, or let two members follow them"
@@ -231,28 +231,29 @@ def _one(group: Node, index: int, count: int | None, bag: DiagnosticBag) -> Node
         elif index == 0 and count is not None:
             message = f"{len(given)} given for {count}: a list has one for each member of the group"
             bag.error("S106", message, value.value_span())
-    member = Node(group.document, group.path, {})
-    member.children = made
-    return member
+    return Node(group.span, children=made)
+
+
+def _is_abstract(resolved: ResolvedFile) -> bool:
+    abstract = resolved.tree.entry("abstract")
+    return abstract is not None and abstract.value is True
 
 
 def check_npc(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """The shape of an npc file."""
-    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    model_of(Npc, resolved.data, resolved, bag, partial=resolved.data.get("abstract") is True)
+    model_of(Npc, resolved.tree, bag, partial=_is_abstract(resolved))
 
 
 def check_library(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """The shape of a library."""
-    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    kind = resolved.data["library"]
-    if kind == "objects":
-        model_of(ObjectLibrary, resolved.data, resolved, bag, parameters=False)
-    elif kind == "grammars":
-        model_of(GrammarLibrary, resolved.data, resolved, bag, parameters=False)
+    kind = resolved.tree.at(("library",))
+    if kind.data == "objects":
+        model_of(ObjectLibrary, resolved.tree, bag, parameters=False)
+    elif kind.data == "grammars":
+        model_of(GrammarLibrary, resolved.tree, bag, parameters=False)
     else:
-        message = f"there is no library of `{kind}`"
-        bag.error("S103", message, resolved.value_span(("library",)), hint="one of objects, grammars")
+        message = f"there is no library of `{kind.data}`"
+        bag.error("S103", message, kind.value_span(), hint="one of objects, grammars")
 
 
 _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
@@ -329,16 +330,14 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
     except ScenarioError as error:
         bag.extend(error.diagnostics)
         return None
-    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     values, declared = parameter_values(resolved, bag), _declared(resolved)
     whole = resolved.changed(
         lambda tree: put_parameters(tree, values, declared, bag),
         lambda tree: put_grammar(tree, bag),
         lambda tree: spread(tree, bag),
     )
-    assert isinstance(whole.data, dict), "internal: a file is a mapping"
-    abstract, failed = whole.data.get("abstract") is True, bag.has_errors
-    shaped = model_of(Scenario, whole.data, whole, bag, partial=abstract)
+    abstract, failed = _is_abstract(whole), bag.has_errors
+    shaped = model_of(Scenario, whole.tree, bag, partial=abstract)
     if shaped.model is None or abstract or failed:
         return None
     return Draft(shaped.model, resolved.name, shaped, values, bool(resolved.edits))
@@ -353,9 +352,7 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     """
     found = DiagnosticBag()
     shaped = draft.shaped
-    checked = check_meaning(
-        draft.scenario, draft.name, shaped.places, found, prelude(), shaped.data, draft.values
-    )
+    checked = check_meaning(draft.scenario, draft.name, shaped.tree, found, prelude(), draft.values)
     if draft.patched:
         found = DiagnosticBag(d for d in found if d.code not in _OF_ALL_VARIANTS)
     if not bag.has_errors:
@@ -406,7 +403,7 @@ def of_other_values(resolved: ResolvedFile) -> Iterator[Diagnostic]:
         if number == MOST_CHOICES:
             return
         bag = DiagnosticBag()
-        asked = resolved.with_params({name: (text, resolved.value_span(("params", name, "values")))})
+        asked = resolved.with_params({name: (text, resolved.tree.value_span(("params", name, "values")))})
         check_scenario(asked, bag)
         for found in bag:
             if found.severity is Severity.ERROR and found not in said:
@@ -425,14 +422,10 @@ def _others(resolved: ResolvedFile) -> Iterator[tuple[str, str]]:
         if isinstance(choices, dict):
             yield from ((name, label) for label, value in choices.items() if default not in (label, value))
         elif isinstance(choices, list):
-            texts = ((_written(value), value) for value in choices if not _same(value, default))
+            texts = ((spelt(value), value) for value in choices if not _same(value, default))
             yield from ((name, text) for text, value in texts if _same(read_plain(text).value, value))
 
 
 def _same(value: Data, other: Data) -> bool:
     """Whether two values are one: 1 is not true."""
     return value == other and isinstance(value, bool) is isinstance(other, bool)
-
-
-def _written(value: Data) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -27,7 +27,7 @@ def check_suite(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedSuite | Non
         names = [member.name for member in members]
         checked = [scenario.checked for scenario in loaded]
         actions = shared_actions(suite, [scenario.scenario for scenario in loaded])
-        space = shared_space(suite, names, checked, actions, resolved, own)
+        space = shared_space(suite, names, checked, actions, resolved.tree, own)
         if not own.has_errors:
             made = LoadedSuite(
                 resolved.name,
@@ -49,7 +49,7 @@ def _right_shape(resolved: ResolvedFile, own: DiagnosticBag) -> Suite | None:
     """The suite's models; None if the members cannot be looked at."""
     if not _has_parameters(resolved, own):
         return None
-    shaped = model_of(Suite, resolved.data, resolved, own, parameters=False)
+    shaped = model_of(Suite, resolved.tree, own, parameters=False)
     _check_parameters(resolved, own)
     if shaped.model is None or own.has_errors:
         return None
@@ -68,7 +68,7 @@ def _has_parameters(resolved: ResolvedFile, own: DiagnosticBag) -> bool:
         near = did_you_mean(name, NODE_KEYS)
         hint = None if near else "a parameter has a list or a mapping of values"
         message = f"`{name}` is no key of a tree, and no parameter, which has values"
-        own.error("S101", message, resolved.key_span(path), suggestion=near, hint=hint)
+        own.error("S101", message, resolved.tree.key_span(path), suggestion=near, hint=hint)
     return not wrong
 
 
@@ -77,12 +77,15 @@ def _is_of_one_kind(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) ->
     own = DiagnosticBag()
     if suite.members is None and suite.sweep is None and suite.tree is None:
         own.error(
-            "S105", "a suite needs a key `members`", resolved.key_span(()), hint="or a `tree`, or a `sweep`"
+            "S105",
+            "a suite needs a key `members`",
+            resolved.tree.key_span(()),
+            hint="or a `tree`, or a `sweep`",
         )
     for word in ("members", "sweep"):
         if suite.tree is not None and getattr(suite, word) is not None:
             message = f"a suite has only one of `tree` and `{word}`"
-            own.error("S107", message, resolved.key_span((word,)))
+            own.error("S107", message, resolved.tree.key_span((word,)))
     if suite.draw == "in_sequence":
         _check_acts(suite, resolved, own)
     bag.extend(own)
@@ -94,11 +97,11 @@ def _check_acts(suite: Suite, resolved: ResolvedFile, own: DiagnosticBag) -> Non
     for word in ("tree", "sweep"):
         if getattr(suite, word) is not None:
             message = f"the acts of an episode are listed in `members`; a `{word}` has no order"
-            own.error("S107", message, resolved.key_span((word,)))
+            own.error("S107", message, resolved.tree.key_span((word,)))
     for i, member in enumerate(suite.members or ()):
         if isinstance(member, Entry) and member.layout is not None:
             message = "an act begins where the one before it ends, so it has no `layout`"
-            own.error("S107", message, resolved.key_span(("members", i, "layout")))
+            own.error("S107", message, resolved.tree.key_span(("members", i, "layout")))
 
 
 def _weights(members: Sequence[Member]) -> tuple[int, ...]:
@@ -111,7 +114,7 @@ def _weights(members: Sequence[Member]) -> tuple[int, ...]:
 def _start(member: Member, resolved: ResolvedFile) -> Start | None:
     if member.layout is None:
         return None
-    layout = resolved.part(member.layout)
+    layout = resolved.tree.at(member.layout).data
     assert isinstance(layout, dict), "internal: the shape of layouts was checked"
     return Start(layout, member.layout)
 
@@ -171,7 +174,7 @@ def _members(suite: Suite, resolved: ResolvedFile, own: DiagnosticBag) -> Sequen
     for member in members:
         if member.name in seen:
             message = f"`{member.name}` is a member already"
-            own.error("S213", message, resolved.value_span(member.place))
+            own.error("S213", message, resolved.tree.value_span(member.place))
         seen.add(member.name)
     return members
 
@@ -198,7 +201,7 @@ def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> N
             if member not in names:
                 near = did_you_mean(member, names)
                 hint = None if near else "its members are " + ", ".join(names)
-                span = resolved.key_span(("sweep", member))
+                span = resolved.tree.key_span(("sweep", member))
                 bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
     if len(list(bag)) > before:
         return
@@ -215,16 +218,16 @@ def _check_split(suite: Suite, name: str, split: Split, resolved: ResolvedFile, 
             owner = "a tree's splits have" if suite.tree is not None else "splits of members have"
             words = of_trees if suite.tree is not None else of_members
             message = f"{owner} `{words[0]}` and `{words[1]}`, no `{word}`"
-            bag.error("S107", message, resolved.key_span(("splits", name, word)))
+            bag.error("S107", message, resolved.tree.key_span(("splits", name, word)))
     if split.replace and split.members is not None:
         message = f"the split `{name}` has only one of `replace` and `members`"
-        bag.error("S107", message, resolved.key_span(("splits", name, "members")))
+        bag.error("S107", message, resolved.tree.key_span(("splits", name, "members")))
     for member in split.replace if suite.tree is None else ():
         names = _written(suite)
         if member not in names:
             near = did_you_mean(member, names)
             hint = None if near else "its members are " + ", ".join(names)
-            span = resolved.key_span(("splits", name, "replace", member))
+            span = resolved.tree.key_span(("splits", name, "replace", member))
             bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
 
 

@@ -11,7 +11,8 @@ from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.document import document_of
 from socialai_dsl.experiments.folder import EXPERIMENT, UnreadableError, read_experiment
 from socialai_dsl.frontend import load_experiment
-from socialai_dsl.loader.library import looks_like_path, shipped_experiments
+from socialai_dsl.loader.reader import shipped_experiments
+from socialai_dsl.loader.resolved import looks_like_path
 
 
 def asked_for(arguments: Namespace) -> tuple[dict[str, Any], Path]:

@@ -19,8 +19,7 @@ class Learnt:
         self._heard = {
             rule.name: (frame.member, rule.hears[0].text)
             for frame in frames
-            for state in frame.states
-            for rule in (*state.first, *state.then)
+            for rule in frame.rules
             if len(rule.hears) == 1
         }
         """Rule -> the member whose it is, and the one utterance that it waits for."""

@@ -3,7 +3,7 @@
 import argparse
 import json
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
@@ -63,20 +63,9 @@ def _resolved(name: str) -> "ResolvedFile":
 def _origins(resolved: "ResolvedFile") -> Iterator[str]:
     """One line for each value that is no container: its place, its path, itself; also in files that are drawn from."""
     whole = resolved.with_drawn_files() if resolved.kind == "scenario" else resolved
-    for path, value in _leaves(whole.data, ()):
-        written = json.dumps(value, ensure_ascii=False)
-        yield f"{whole.origin(path)}: {_dotted(path)} = {written}"
-
-
-def _leaves(value: Any, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
-    if isinstance(value, dict) and value:
-        for key, part in value.items():
-            yield from _leaves(part, (*path, key))
-    elif isinstance(value, list) and value:
-        for index, part in enumerate(value):
-            yield from _leaves(part, (*path, index))
-    else:
-        yield path, value
+    for path, part in whole.tree.walk():
+        if not part.children:
+            yield f"{part.value_span()}: {_dotted(path)} = {json.dumps(part.data, ensure_ascii=False)}"
 
 
 def _dotted(path: tuple[str | int, ...]) -> str:

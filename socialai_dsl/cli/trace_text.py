@@ -8,6 +8,7 @@ from typing import Any, Final
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.evaluation.episode_trace import Trace, TraceStep, is_among
 from socialai_dsl.replay.state import found, present
+from socialai_dsl.vocabulary import spelt
 
 _WIDTH: Final = 100
 _GAP: Final = "    "
@@ -46,7 +47,7 @@ class Text:
         said = f', says "{step.said}"' if step.said is not None else ""
         facts = [f"agent   {step.action}{said}", *(f"heard   {line}" for line in step.heard)]
         facts += [
-            f"changed {address}: {_plain(old)} -> {_plain(new)}"
+            f"changed {address}: {spelt(old)} -> {spelt(new)}"
             for address, (old, new) in step.changed.items()
             if address.rpartition(".")[2] not in _QUIET
         ]
@@ -121,9 +122,3 @@ def _beside(picture: str, facts: list[str]) -> list[str]:
 
 def _folded(text: str, indent: str) -> list[str]:
     return textwrap.wrap(printable(text), _WIDTH, initial_indent=indent, subsequent_indent=indent + "  ")
-
-
-def _plain(value: Any) -> str:
-    if value is None:
-        return "nothing"
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -192,11 +192,8 @@ class Activities:
         turn = self.to.value(way)
         done = Label()
         for value, body in ((-1, Body.LEFT), (1, Body.RIGHT)):
-            following = Label()
-            block.test(Op.IF_EQ, turn, constant(value), following)
-            block.emit(Op.BODY, constant(body))
-            block.skip(done)
-            block.bind(following)
+            with block.when(Op.IF_EQ, turn, constant(value), then=done):
+                block.emit(Op.BODY, constant(body))
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 
@@ -204,12 +201,10 @@ class Activities:
         """Go next to the goal while it is farther away than that."""
         to, block, own = self.to, self.to.block, constant(self.entity)
         goal = self._present(activity.args[0])
-        near, done = Label(), Label()
+        done = Label()
         distance = to.into_temporary(Op.DISTANCE, own, goal)
-        block.test(Op.IF_LT, to.value(activity.args[1]), distance, near)
-        block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
-        block.skip(done)
-        block.bind(near)
+        with block.when(Op.IF_LT, to.value(activity.args[1]), distance, then=done):
+            block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 
@@ -217,17 +212,13 @@ class Activities:
         """Go next to the goal, face it, toggle."""
         block = self.to.block
         own = constant(self.entity)
-        away, aside, done = Label(), Label(), Label()
-        block.test(Op.IF_NEXT_TO, own, goal, away)
-        block.test(Op.IF_FACES, own, goal, aside)
-        if noting:
-            self._note(ACTING)
-        block.emit(Op.BODY, constant(Body.TOGGLE))
-        block.skip(done)
-        block.bind(aside)
-        self._face(goal)
-        block.skip(done)
-        block.bind(away)
+        done = Label()
+        with block.when(Op.IF_NEXT_TO, own, goal, then=done):
+            with block.when(Op.IF_FACES, own, goal, then=done):
+                if noting:
+                    self._note(ACTING)
+                block.emit(Op.BODY, constant(Body.TOGGLE))
+            self._face(goal)
         block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.bind(done)
 
@@ -276,16 +267,11 @@ class Activities:
     ) -> None:
         """Go next to the goal, face it, act; then on to `done`."""
         block, own = self.to.block, constant(self.entity)
-        away, aside = Label(), Label()
-        block.test(Op.IF_NEXT_TO, own, goal, away)
-        block.test(Op.IF_FACES, own, goal, aside)
-        self._note(ACTING)
-        act(lambda: block.emit(Op.BODY, constant(body)))
-        block.skip(done)
-        block.bind(aside)
-        act(lambda: self._face(goal))
-        block.skip(done)
-        block.bind(away)
+        with block.when(Op.IF_NEXT_TO, own, goal, then=done):
+            with block.when(Op.IF_FACES, own, goal, then=done):
+                self._note(ACTING)
+                act(lambda: block.emit(Op.BODY, constant(body)))
+            act(lambda: self._face(goal))
         act(lambda: block.emit(Op.GO_NEXT_TO, own, goal, self.turn))
         block.skip(done)
 
@@ -315,20 +301,15 @@ class Activities:
         """Use it while it cannot be walked on, then go there; who is there stays there."""
         block = self.to.block
         entity = self._aimed_at(activity)
-        shut, done, away = Label(), Label(), Label()
-        block.test(Op.IF_SAME_CELL, constant(self.entity), entity, away)
-        block.emit(Op.BODY, constant(Body.NONE))
-        block.skip(done)
-        block.bind(away)
+        shut, done = Label(), Label()
+        with block.when(Op.IF_SAME_CELL, constant(self.entity), entity, then=done):
+            block.emit(Op.BODY, constant(Body.NONE))
         walkable = sorted(_kind_of(self.checked, activity.args[0]).walkable)
         status = block.temporary()
         block.emit(Op.FIELD, status, entity, Field.STATUS)
         found = Label()
         for number in walkable:
-            following = Label()
-            block.test(Op.IF_EQ, status, constant(number), following)
-            block.skip(found)
-            block.bind(following)
+            block.unless(Op.IF_EQ, status, constant(number), found)
         block.skip(shut)
         block.bind(found)
         block.emit(Op.GO_TO, constant(self.entity), entity, self.turn)
@@ -343,11 +324,9 @@ class Activities:
         thing, way = (to.value(arg) for arg in activity.args)
         self._note(GETTING_THERE)
         behind = self._behind(thing, way)
-        elsewhere, done = Label(), Label()
-        block.test(Op.IF_SAME_CELL, constant(self.entity), behind, elsewhere)
-        self._walk(way, pushing=True)
-        block.skip(done)
-        block.bind(elsewhere)
+        done = Label()
+        with block.when(Op.IF_SAME_CELL, constant(self.entity), behind, then=done):
+            self._walk(way, pushing=True)
         block.emit(Op.GO_TO, constant(self.entity), behind, self.turn)
         block.bind(done)
 
@@ -366,13 +345,11 @@ class Activities:
     def _walk(self, way: int, pushing: bool = False) -> None:
         """Turn until it faces that way, then go forward."""
         block = self.to.block
-        aside, done = Label(), Label()
-        block.test(Op.IF_EQ, entity_register(self.entity, Field.DIR), way, aside)
-        if pushing:
-            self._note(ACTING)
-        block.emit(Op.BODY, constant(Body.FORWARD))
-        block.skip(done)
-        block.bind(aside)
+        done = Label()
+        with block.when(Op.IF_EQ, entity_register(self.entity, Field.DIR), way, then=done):
+            if pushing:
+                self._note(ACTING)
+            block.emit(Op.BODY, constant(Body.FORWARD))
         block.emit(Op.TURN_TO, constant(self.entity), way, self.turn)
         block.bind(done)
 
@@ -381,13 +358,10 @@ class Activities:
         block = self.to.block
         done = Label()
         for k, (move, utterance) in enumerate(_elements(activity)):
-            following = Label()
             mark = block.taken
-            block.test(Op.IF_EQ, self.clock, constant(k), following)
-            block.emit(Op.BODY, self.to.value(move))
-            self.lines.perform(self.to, self.checked.entities[self.entity], utterance)
-            block.skip(done)
-            block.bind(following)
+            with block.when(Op.IF_EQ, self.clock, constant(k), then=done):
+                block.emit(Op.BODY, self.to.value(move))
+                self.lines.perform(self.to, self.checked.entities[self.entity], utterance)
             block.release(mark)
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
@@ -412,11 +386,8 @@ class Activities:
         below = 0
         for option, weight in zip(activity.args, weights, strict=True):
             below += weight
-            following = Label()
-            block.test(Op.IF_LT, drawn, constant(below), following)
-            block.emit(Op.BODY, self.to.value(option))
-            block.skip(done)
-            block.bind(following)
+            with block.when(Op.IF_LT, drawn, constant(below), then=done):
+                block.emit(Op.BODY, self.to.value(option))
         block.bind(done)
 
     def unless_finished(self, activity: Activity, otherwise: Label, nothing: Label) -> None:
@@ -438,10 +409,7 @@ class Activities:
             block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
             ended = Label()
             if activity.name in OF_HANDS:
-                missing = Label()
-                block.test(Op.IF_EQ, self.aim, constant(FULFILLED), missing)
-                block.skip(ended)
-                block.bind(missing)
+                block.unless(Op.IF_EQ, self.aim, constant(FULFILLED), ended)
             block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
             # A scripted agent's frame follows what the agent has really done.
             act = constant(_ACT_OF[activity.name])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.draws import site as site_number
@@ -95,6 +96,21 @@ class Block:
         label.position = len(self.instructions)
         for use in label.uses:
             self.instructions[use][3] = label.position - use - 1
+
+    def unless(self, op: Op, a: int, b: int, then: Label) -> None:
+        """Append a test that skips to `then` if true."""
+        with self.when(op, a, b, then):
+            pass
+
+    @contextmanager
+    def when(self, op: Op, a: int, b: int, then: Label | None = None) -> Iterator[None]:
+        """What is emitted within runs only if a test holds, and then goes on to `then`, if that is given."""
+        following = Label()
+        self.test(op, a, b, following)
+        yield
+        if then is not None:
+            self.skip(then)
+        self.bind(following)
 
     def fuse_answer(self, start: int) -> None:
         """Put what begins at `start` into one instruction, if all of it is to count, to say and perhaps to go on."""

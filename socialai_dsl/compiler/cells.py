@@ -184,11 +184,9 @@ def one_cell(to: Emitter, term: terms.Quantified) -> int:
     if to.failed is not None:
         block.test(Op.IF_LE, constant(0), x, to.failed)
     else:
-        found = Label()
-        block.test(Op.IF_LT, x, constant(0), found)
-        block.emit(Op.B_FLOOR, board)
-        block.emit(Op.FIRST_CELL, x, board)
-        block.bind(found)
+        with block.when(Op.IF_LT, x, constant(0)):
+            block.emit(Op.B_FLOOR, board)
+            block.emit(Op.FIRST_CELL, x, board)
     block.release_boards(boards)
     result = block.temporary()
     block.emit(Op.MUL, result, x + 1, constant(ROW))
@@ -482,12 +480,10 @@ def _nth(to: Emitter, term: terms.Quantified, left: int) -> int:
     result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
     done = Label()
     for item in term.items:
-        following, found = Label(), Label()
+        following = Label()
         to.condition(to.instance(term, item), following)
-        block.test(Op.IF_NE, left, constant(0), found)
-        block.emit(Op.SUB, left, left, constant(1))
-        block.skip(following)
-        block.bind(found)
+        with block.when(Op.IF_NE, left, constant(0), then=following):
+            block.emit(Op.SUB, left, left, constant(1))
         block.emit(Op.LOAD, result, constant(item.value))
         block.skip(done)
         block.bind(following)
@@ -504,10 +500,8 @@ def _item(to: Emitter, items: tuple[Const, ...], position: int) -> int:
         return to.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
     result = to.into_temporary(Op.LOAD, constant(values[0]))
     for i, value in enumerate(values[1:], 1):
-        following = Label()
-        to.block.test(Op.IF_EQ, position, constant(i), following)
-        to.block.emit(Op.LOAD, result, constant(value))
-        to.block.bind(following)
+        with to.block.when(Op.IF_EQ, position, constant(i)):
+            to.block.emit(Op.LOAD, result, constant(value))
     return result
 
 

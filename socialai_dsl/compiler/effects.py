@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Set
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Generic, TypeAlias, TypeVar
 
 from socialai_dsl.compiler.assembler import (
     NOWHERE,
@@ -20,7 +22,7 @@ from socialai_dsl.compiler.assembler import (
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
-from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole, plans
+from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, Chosen, sizes
@@ -44,17 +46,14 @@ from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, Sited, Term, T
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """Registers that hold how a thing was at first; None of what cannot change."""
+    """Registers that hold how a thing was at first: its cell and its fields, without what cannot change."""
 
     cell: int | None
-    gone: int | None
-    facing: int | None
-    inside: int | None
-    carrier: int | None = None
+    fields: dict[Field, int]
 
 
 class Homes:
-    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then the other fields of `Home`."""
+    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then the fields of a `Home`."""
 
     def __init__(self, checked: CheckedScenario, registers: Registers) -> None:
         self.checked = checked
@@ -71,19 +70,13 @@ class Homes:
         for number, home in self.of.items():
             if home.cell is not None:
                 _save_cell(block, number, home.cell)
-            for register, field in (
-                (home.gone, Field.GONE),
-                (home.facing, Field.DIR),
-                (home.inside, Field.INSIDE),
-                (home.carrier, Field.CARRIER),
-            ):
-                if register is not None:
-                    block.emit(Op.LOAD, register, entity_register(number, field))
+            for field, register in home.fields.items():
+                block.emit(Op.LOAD, register, entity_register(number, field))
 
     def is_fixed(self, thing: Entity) -> bool:
         """Whether nothing but its status can change."""
         points = thing.role == "npc" and self.pointing
-        return self.of[thing.number] == Home(None, None, None, None) and not thing.contains and not points
+        return self.of[thing.number] == Home(None, {}) and not thing.contains and not points
 
     def put_back(self, to: Expressions, number: int) -> None:
         """Emit that a thing is where and as it was, and what lay in it lies in it again; its status is left alone."""
@@ -91,17 +84,14 @@ class Homes:
         own = constant(number)
         if home.cell is not None:
             block.emit(Op.PLACE, own, home.cell)
-        if home.gone is not None:
-            stays = Label()
-            block.test(Op.IF_NE, home.gone, constant(0), stays)
-            block.emit(Op.VANISH, own)
-            block.bind(stays)
-        if home.facing is not None:
-            block.emit(Op.SET_FIELD, own, Field.DIR, home.facing)
-        if home.inside is not None:
-            block.emit(Op.SET_FIELD, own, Field.INSIDE, home.inside)
-        if home.carrier is not None:
-            back_into_hands(to, number, home.carrier)
+        if Field.GONE in home.fields:
+            with block.when(Op.IF_NE, home.fields[Field.GONE], constant(0)):
+                block.emit(Op.VANISH, own)
+        for field in (Field.DIR, Field.INSIDE):
+            if field in home.fields:
+                block.emit(Op.SET_FIELD, own, field, home.fields[field])
+        if Field.CARRIER in home.fields:
+            back_into_hands(to, number, home.fields[Field.CARRIER])
         if thing.role == "npc" and self.pointing:
             block.emit(Op.SET_FIELD, own, Field.POINTING, constant(0))
         for content in thing.contains:
@@ -111,11 +101,12 @@ class Homes:
         """What lay in a thing at first lies in it again."""
         home = self.of[number]
         assert home.cell is not None, "internal: contents can move"
-        assert home.gone is not None, "internal: contents can vanish"
-        assert home.inside is not None, "internal: contents lie in something"
+        assert {Field.GONE, Field.INSIDE} <= home.fields.keys(), (
+            "internal: contents vanish and lie in something"
+        )
         elsewhere = Label()
-        block.test(Op.IF_NE, home.gone, constant(0), elsewhere)
-        block.test(Op.IF_EQ, home.inside, constant(holder), elsewhere)
+        block.test(Op.IF_NE, home.fields[Field.GONE], constant(0), elsewhere)
+        block.test(Op.IF_EQ, home.fields[Field.INSIDE], constant(holder), elsewhere)
         block.emit(Op.PLACE, constant(number), home.cell)
         block.emit(Op.VANISH, constant(number))
         block.emit(Op.SET_FIELD, constant(number), Field.INSIDE, constant(holder))
@@ -124,7 +115,7 @@ class Homes:
 
 def _named(checked: CheckedScenario) -> Iterator[int]:
     """What a `reset` names, and what may lie in that."""
-    for plan in plans(checked):
+    for plan in checked.causing:
         for effect in plan.causes:
             if effect.name == "reset":
                 for target in effect.entities:
@@ -136,15 +127,21 @@ def _named(checked: CheckedScenario) -> Iterator[int]:
 def _reserve(thing: Entity, mobility: Mobility, registers: Registers, entities: int) -> Home:
     number, path = thing.number, f"{label(thing)}.reset.home"
 
-    def room(suffix: str, type_: Type, changes: bool) -> int | None:
-        return registers.add(path + suffix, type_) if changes else None
-
+    changing = (
+        (Field.GONE, "gone", BOOL, mobility.vanishing),
+        (Field.DIR, "facing", terms.DIRECTION, mobility.turning),
+        (Field.INSIDE, "inside", Type("entity", 0, entities - 1), mobility.contents),
+        (Field.CARRIER, "carrier", Type("int", 0, entities), mobility.carried),
+    )
+    moves = number in mobility.walking | mobility.vanishing
+    cell = registers.add(path, terms.CELL) if moves else None
     return Home(
-        cell=room("", terms.CELL, number in mobility.walking | mobility.vanishing),
-        gone=room(".gone", BOOL, number in mobility.vanishing),
-        facing=room(".facing", terms.DIRECTION, number in mobility.turning),
-        inside=room(".inside", Type("entity", 0, entities - 1), number in mobility.contents),
-        carrier=room(".carrier", Type("int", 0, entities), number in mobility.carried),
+        cell,
+        {
+            field: registers.add(f"{path}.{name}", type_)
+            for field, name, type_, numbers in changing
+            if number in numbers
+        },
     )
 
 
@@ -165,9 +162,13 @@ def _save_cell(block: Block, number: int, register: int) -> None:
 _TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 
 
+V = TypeVar("V")
+W = TypeVar("W")
+
+
 @dataclass(frozen=True, slots=True)
-class Operands:
-    """Where the values are that a rule or step needs.
+class Values(Generic[V]):
+    """Where the values are that a rule or step needs: as operands, or as registers that keep them.
 
     Attributes:
         sets: of each register that is set. keys: of each of these the first register of its row and the operand of its
@@ -176,12 +177,35 @@ class Operands:
         `those(...)`, see `compiler/those.py`.
     """
 
-    sets: tuple[int, ...]
-    keys: tuple[tuple[int, int] | None, ...]
-    targets: tuple[tuple[int, ...], ...]
-    values: tuple[int | None, ...]
-    line: int | None
-    chosen: tuple[int, ...] = ()
+    sets: tuple[V, ...]
+    keys: tuple[tuple[int, V] | None, ...]
+    targets: tuple[tuple[V, ...], ...]
+    values: tuple[V | None, ...]
+    line: V | None
+    chosen: tuple[V, ...] = ()
+
+    def each(self) -> Iterator[V]:
+        """All of them, in the order of the attributes."""
+        yield from self.sets
+        yield from (key[1] for key in self.keys if key is not None)
+        yield from chain.from_iterable(self.targets)
+        yield from (value for value in self.values if value is not None)
+        yield from () if self.line is None else (self.line,)
+        yield from self.chosen
+
+    def mapped(self, change: Callable[[V], W]) -> Values[W]:
+        """The same with another in place of each, made in the order of `each`."""
+        return Values(
+            tuple(map(change, self.sets)),
+            tuple(None if key is None else (key[0], change(key[1])) for key in self.keys),
+            tuple(tuple(map(change, targets)) for targets in self.targets),
+            tuple(None if value is None else change(value) for value in self.values),
+            None if self.line is None else change(self.line),
+            tuple(map(change, self.chosen)),
+        )
+
+
+Operands: TypeAlias = Values[int]
 
 
 def _chooses(what: RulePlan | StepPlan) -> bool:
@@ -228,7 +252,7 @@ class Effects:
             line = self._steady(self.lines.say(to, speaker, what.say), what)
         to.failed = None
         to.block.span = what.span
-        return Operands(sets, keys, tuple(targets), tuple(values), line, chosen.bits if chosen else ())
+        return Values(sets, keys, tuple(targets), tuple(values), line, chosen.bits if chosen else ())
 
     def _key(self, item: Assignment, what: RulePlan | StepPlan) -> tuple[int, int] | None:
         """The first register of a row, and the place of the one that is set."""
@@ -294,11 +318,9 @@ class Effects:
         if effect.name != "unlock":
             block.emit(Op.BECOME, entity, constant(states.index(_TARGETS[effect.name])))
             return
-        done = Label()
         status = self.to.into_temporary(Op.FIELD, entity, Field.STATUS)
-        block.test(Op.IF_EQ, status, constant(states.index("locked")), done)
-        block.emit(Op.BECOME, entity, constant(thing.type.unlocked))
-        block.bind(done)
+        with block.when(Op.IF_EQ, status, constant(states.index("locked"))):
+            block.emit(Op.BECOME, entity, constant(thing.type.unlocked))
 
     def _reset(self, term: Term, entity: int) -> None:
         """Back to what it was at first, which may differ from one object of a group to the next."""
@@ -312,11 +334,8 @@ class Effects:
             return
         done = Label()
         for thing in things[:-1]:
-            following = Label()
-            block.test(Op.IF_EQ, entity, constant(thing.number), following)
-            self._put_back(thing, entity)
-            block.skip(done)
-            block.bind(following)
+            with block.when(Op.IF_EQ, entity, constant(thing.number), then=done):
+                self._put_back(thing, entity)
         self._put_back(things[-1], entity)
         block.bind(done)
 
@@ -391,12 +410,8 @@ def _note_whether(to: Expressions, path: str, condition: Sited) -> None:
     """Let a register tell whether a condition holds; it is 0 from the reset on."""
     if fold_whole(condition.term, to.facts, to.classes) == FALSE:
         return
-    register, not_so = to.registers.by_path[path], Label()
     to.block.span = condition.span
-    to.block.emit(Op.LOAD, register, constant(0))
-    to.sited_condition(condition, not_so)
-    to.block.emit(Op.LOAD, register, constant(1))
-    to.block.bind(not_so)
+    to.note_whether(to.registers.by_path[path], condition)
 
 
 def push_acts(to: Expressions) -> None:
@@ -424,31 +439,11 @@ def push_acts(to: Expressions) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """A register that keeps a value, and the range of the value; a known value needs no register (None).
-
-    `first` is the first register of the row that the value is a place in.
-    """
+    """A register that keeps a value, and the range of the value; a known value needs no register (None)."""
 
     register: int | None
     low: int
     high: int
-    first: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class _KeptRule:
-    sets: tuple[_Kept, ...]
-    keys: tuple[_Kept | None, ...]
-    targets: tuple[tuple[_Kept, ...], ...]
-    values: tuple[_Kept | None, ...]
-    line: _Kept | None
-    chosen: tuple[_Kept, ...]
-
-    def registers(self) -> Iterator[int]:
-        """Those that are in use."""
-        targets = (kept for targets in self.targets for kept in targets)
-        every = [*self.sets, *self.keys, *targets, *self.values, self.line, *self.chosen]
-        return (kept.register for kept in every if kept is not None and kept.register is not None)
 
 
 class Deferred:
@@ -472,7 +467,7 @@ class Deferred:
     def note(self, to: Expressions, rule: RulePlan, operands: Operands) -> None:
         """Emit that the rest of a rule is to be carried out later, with these values."""
         kept = self._kept[self.rules.index(rule)]
-        for part, operand in _pairs(kept, operands):
+        for part, operand in zip(kept.each(), operands.each(), strict=True):
             if part.register is not None:
                 _keep(to, part, operand)
         to.block.emit(Op.LOAD, self._pending, constant(1 + self.rules.index(rule)))
@@ -484,29 +479,22 @@ class Deferred:
     def recall(self, to: Expressions, rule: RulePlan) -> Operands:
         """Emit that the values are fetched and forgotten."""
         kept = self._kept[self.rules.index(rule)]
+        fetched = [_fetch(to, part) for part in kept.sets]
+        sets = tuple(to.into_temporary(Op.LOAD, operand) for operand in fetched)
+        others = replace(kept, sets=()).mapped(lambda part: _fetch(to, part))
+        for part in kept.each():
+            if part.register is not None:
+                to.block.emit(Op.LOAD, part.register, constant(0))
+        to.block.emit(Op.LOAD, self._pending, constant(0))
+        return replace(others, sets=sets)
 
-        def fetched(parts: Sequence[_Kept]) -> tuple[int, ...]:
-            return tuple(_fetch(to, part) for part in parts)
-
-        operands = Operands(
-            tuple(to.into_temporary(Op.LOAD, operand) for operand in fetched(kept.sets)),
-            tuple(None if part is None else (part.first, _fetch(to, part)) for part in kept.keys),
-            tuple(map(fetched, kept.targets)),
-            tuple(None if part is None else _fetch(to, part) for part in kept.values),
-            None if kept.line is None else _fetch(to, kept.line),
-            fetched(kept.chosen),
-        )
-        for register in (*kept.registers(), self._pending):
-            to.block.emit(Op.LOAD, register, constant(0))
-        return operands
-
-    def _room(self, rule: RulePlan) -> _KeptRule:
+    def _room(self, rule: RulePlan) -> Values[_Kept]:
         sets = []
         for item in rule.sets:
             name = next(name for name in self.registers.names if name.path == item.paths[0])
             sets.append(self._kept_range(name.low, name.high))
         line = None if rule.say is None else self._kept_range(*self.lines.bounds(self.speaker, rule.say))
-        return _KeptRule(
+        return Values(
             tuple(sets),
             tuple(self._kept_key(item) for item in rule.sets),
             tuple(tuple(self._kept_term(entity) for entity in effect.entities) for effect in rule.causes),
@@ -515,12 +503,12 @@ class Deferred:
             tuple(self._kept_range(0, (1 << bits) - 1) for bits in (sizes(rule) if _chooses(rule) else ())),
         )
 
-    def _kept_key(self, item: Assignment) -> _Kept | None:
+    def _kept_key(self, item: Assignment) -> tuple[int, _Kept] | None:
         """The place in a row; the registers of the row that it may name are next to each other."""
         if item.target is None:
             return None
         first, low, high = row_of(self.registers, item.target)
-        return replace(self._kept_range(low, high), first=first)
+        return first, self._kept_range(low, high)
 
     def _kept_term(self, term: Term) -> _Kept:
         if isinstance(term, Const):
@@ -541,21 +529,6 @@ class Deferred:
 def _has_more(rule: RulePlan) -> bool:
     more = rule.sets or rule.causes or rule.say is not None or rule.goto or rule.goto_now
     return rule.do is not None and bool(more)
-
-
-def _pairs(kept: _KeptRule, operands: Operands) -> Iterator[tuple[_Kept, int]]:
-    yield from zip(kept.sets, operands.sets, strict=True)
-    for place, key in zip(kept.keys, operands.keys, strict=True):
-        if place is not None and key is not None:
-            yield place, key[1]
-    for parts, targets in zip(kept.targets, operands.targets, strict=True):
-        yield from zip(parts, targets, strict=True)
-    for part, value in zip(kept.values, operands.values, strict=True):
-        if part is not None and value is not None:
-            yield part, value
-    if kept.line is not None and operands.line is not None:
-        yield kept.line, operands.line
-    yield from zip(kept.chosen, operands.chosen, strict=True)
 
 
 def _keep(to: Expressions, kept: _Kept, operand: int) -> None:
@@ -601,11 +574,9 @@ def _unlock(to: Expressions, switch: Entity) -> None:
     following = Label()
     _works(to, switch, following)
     for target in lockable:
-        left_alone = Label()
-        to.block.test(Op.IF_EQ, _status(target), constant(_state(target, "locked")), left_alone)
-        assert target.type is not None, "internal: only objects can be locked"
-        to.block.emit(Op.BECOME, constant(target.number), constant(target.type.unlocked))
-        to.block.bind(left_alone)
+        with to.block.when(Op.IF_EQ, _status(target), constant(_state(target, "locked"))):
+            assert target.type is not None, "internal: only objects can be locked"
+            to.block.emit(Op.BECOME, constant(target.number), constant(target.type.unlocked))
     to.block.bind(following)
 
 
@@ -661,10 +632,8 @@ def _hold_back(to: Expressions, thing: Entity) -> None:
     block.emit(Op.LOAD, held, constant(0))
     for other in others:
         initial = constant(other.status) if other.initial is None else to.value(other.initial)
-        unchanged = Label()
-        block.test(Op.IF_NE, _status(other), initial, unchanged)
-        block.emit(Op.LOAD, held, constant(1))
-        block.bind(unchanged)
+        with block.when(Op.IF_NE, _status(other), initial):
+            block.emit(Op.LOAD, held, constant(1))
     block.emit(Op.SET_FIELD, constant(thing.number), Field.POKED, held)
     block.release(mark)
 
@@ -710,19 +679,15 @@ def _tick(to: Expressions, entity: Entity) -> None:
     block.span = entity.span
     timer = to.registers.by_path[f"{label(entity)}.timer"]
     status = entity_register(entity.number, Field.STATUS)
-    idle, done = Label(), Label()
+    idle = Label()
     mark = block.taken
     to.one_of(Op.IF_EQ, status, entity.type.active, idle)
     count = to.into_temporary(Op.ADD, timer, constant(1))
     block.emit(Op.MIN, timer, count, constant(entity.timer))
-    block.test(Op.IF_EQ, timer, constant(entity.timer), done)
-    for before, after in sorted(entity.type.expired.items()):
-        following = Label()
-        block.test(Op.IF_EQ, status, constant(before), following)
-        block.emit(Op.BECOME, constant(entity.number), constant(after))
-        block.skip(idle)
-        block.bind(following)
-    block.bind(idle)
-    block.emit(Op.LOAD, timer, constant(0))
-    block.bind(done)
+    with block.when(Op.IF_EQ, timer, constant(entity.timer)):
+        for before, after in sorted(entity.type.expired.items()):
+            with block.when(Op.IF_EQ, status, constant(before), then=idle):
+                block.emit(Op.BECOME, constant(entity.number), constant(after))
+        block.bind(idle)
+        block.emit(Op.LOAD, timer, constant(0))
     block.release(mark)

@@ -401,6 +401,14 @@ class Expressions(Emitter):
             result = self.into_temporary(_ARITHMETIC[term.op], result, self.value(arg))
         return result
 
+    def note_whether(self, register: int, condition: terms.Sited) -> None:
+        """Let a register tell whether a condition holds."""
+        self.block.emit(Op.LOAD, register, constant(0))
+        false = Label()
+        self.sited_condition(condition, false)
+        self.block.emit(Op.LOAD, register, constant(1))
+        self.block.bind(false)
+
     def _truth_value(self, term: Term) -> int:
         result = self.block.temporary()
         false = Label()
@@ -518,11 +526,9 @@ class Lines:
         noted = to.registers.by_path.get(said_path(speaker))
         if noted is None:
             return
-        spoken = Label()
         mark = block.taken
-        block.test(Op.IF_EQ, noted, constant(0), spoken)
-        block.emit(Op.LOAD, noted, to.into_temporary(Op.ADD, line, constant(1)))
-        block.bind(spoken)
+        with block.when(Op.IF_EQ, noted, constant(0)):
+            block.emit(Op.LOAD, noted, to.into_temporary(Op.ADD, line, constant(1)))
         block.release(mark)
 
     def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
@@ -640,10 +646,8 @@ class Lines:
                 assert to.failed is not None, "internal: an unsayable line outside of a rule"
                 to.block.test(Op.IF_NE, position, constant(i), to.failed)
                 continue
-            following = Label()
-            to.block.test(Op.IF_EQ, position, constant(i), following)
-            to.block.emit(Op.LOAD, result, constant(number))
-            to.block.bind(following)
+            with to.block.when(Op.IF_EQ, position, constant(i)):
+                to.block.emit(Op.LOAD, result, constant(number))
         return result
 
     def _utterances(self, line: Line) -> list[int | None]:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import reduce
 from itertools import product
-from operator import add, mul, sub
-from typing import Any, TypeVar, assert_never
+from typing import Any, Final, assert_never
 
 from socialai_dsl.grammar.ast import children, every, rebuilt
 from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity
 from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import (
@@ -24,12 +22,11 @@ from socialai_dsl.semantics.terms import (
     Pattern,
     Speaker,
     Term,
+    compute,
     may_find_nothing,
     numbers_of,
 )
 from socialai_dsl.vocabulary import normal
-
-_Kind = TypeVar("_Kind")
 
 SILENCE = 0
 OTHER = 1
@@ -246,10 +243,7 @@ def _decide(term: Term) -> Term:
     if isinstance(term, terms.Not) and isinstance(term.arg, Const):
         return _truth(not term.arg.value)
     if isinstance(term, terms.Compare) and isinstance(term.left, Const) and isinstance(term.right, Const):
-        left, right = term.left.value, term.right.value
-        return _truth(
-            {"==": left == right, "!=": left != right, "<": left < right, "<=": left <= right}[term.op]
-        )
+        return _truth(terms.COMPARISONS[term.op](term.left.value, term.right.value))
     if isinstance(term, terms.Logic):
         return _decide_logic(term)
     if isinstance(term, terms.Operation):
@@ -267,24 +261,14 @@ def _decide(term: Term) -> Term:
 
 def _decide_operation(term: terms.Operation) -> Term:
     """A sum of known values, and the like; left as it is where its type would cut it."""
-    if term.op not in _ARITHMETIC:
-        return term
     values = [arg.value for arg in term.args if isinstance(arg, Const)]
-    if len(values) < len(term.args):
+    if term.op not in _ARITHMETIC or len(values) < len(term.args):
         return term
-    result = reduce(_ARITHMETIC[term.op], values)
+    result = compute(term.op, *values)
     return Const(term.type, result) if term.type.low <= result <= term.type.high else term
 
 
-_ARITHMETIC: dict[str, Callable[[int, int], int]] = {
-    "+": add,
-    "-": sub,
-    "*": mul,
-    "//": lambda left, right: left // right if right else 0,
-    "%": lambda left, right: left % right if right else 0,
-    "min": min,
-    "max": max,
-}
+_ARITHMETIC: Final = frozenset(("+", "-", "*", "//", "%", "min", "max"))
 
 
 def _decide_logic(term: terms.Logic) -> Term:
@@ -364,10 +348,10 @@ class Changes:
     def __init__(self, checked: CheckedScenario) -> None:
         self.entities = checked.entities
         self.occlusion = checked.room.occlusion
-        self.set_by_rules = {path for plan in plans(checked) for item in plan.sets for path in item.paths}
+        self.set_by_rules = {path for plan in checked.causing for item in plan.sets for path in item.paths}
         self.changed = {
             number
-            for plan in plans(checked)
+            for plan in checked.causing
             for effect in plan.causes
             for entity in effect.entities
             for number in numbers_of(entity)
@@ -527,9 +511,10 @@ class Mobility:
         self.contents: set[int] = set()
         self.carried: set[int] = set()
         self.pointing = False
-        for number, activity in activities(checked):
-            self._act(number, activity)
-        for plan in plans(checked):
+        for frame in checked.frames:
+            for activity in frame.activities:
+                self._act(frame.entity, activity)
+        for plan in checked.causing:
             for effect in plan.causes:
                 self._cause(effect)
         for entity in checked.entities:
@@ -569,24 +554,3 @@ def leaving(checked: CheckedScenario) -> frozenset[int]:
     Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
     """
     return frozenset(Mobility(checked).vanishing)
-
-
-def plans(checked: CheckedScenario) -> Iterable[RulePlan | StepPlan]:
-    """Everything that has effects."""
-    yield from checked.rules
-    for frame in checked.frames:
-        yield from frame.steps
-        for state in frame.states:
-            yield from (*state.first, *state.then)
-
-
-def activities(checked: CheckedScenario) -> Iterable[tuple[int, Activity]]:
-    """The possible activities of each member."""
-    for frame in checked.frames:
-        for step in frame.steps:
-            yield frame.entity, step.activity
-        for state in frame.states:
-            yield frame.entity, state.activity
-            for rule in (*state.first, *state.then):
-                if rule.do is not None:
-                    yield frame.entity, rule.do

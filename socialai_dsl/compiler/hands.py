@@ -36,15 +36,13 @@ def into_hands(to: Expressions, thing: int, who: int) -> None:
 
 def back_into_hands(to: Expressions, number: int, carrier: int) -> None:
     """A thing is in nobody's hands any more, or again in those that register `carrier` names, if these are empty."""
-    nobody = Label()
     to.block.emit(Op.SET_FIELD, constant(number), Field.CARRIER, constant(0))
-    to.block.test(Op.IF_NE, carrier, constant(0), nobody)
-    mark = to.block.taken
-    least = to.into_temporary(Op.MIN, carrier, constant(members(to.checked)))
-    who = to.into_temporary(Op.SUB, least, constant(1))
-    into_hands(to, constant(number), to.into_temporary(Op.MAX, who, constant(0)))
-    to.block.release(mark)
-    to.block.bind(nobody)
+    with to.block.when(Op.IF_NE, carrier, constant(0)):
+        mark = to.block.taken
+        least = to.into_temporary(Op.MIN, carrier, constant(members(to.checked)))
+        who = to.into_temporary(Op.SUB, least, constant(1))
+        into_hands(to, constant(number), to.into_temporary(Op.MAX, who, constant(0)))
+        to.block.release(mark)
 
 
 def out_of_hands(to: Expressions, term: Term, entity: int) -> None:

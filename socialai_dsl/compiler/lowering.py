@@ -210,8 +210,7 @@ class _FrameCompiler:
         self.counters = {name: self._counter(name) for name in self._names()}
         self.once = {
             rule.name: shared.registers.add(f"{frame.member}.fired.{rule.name}", BOOL)
-            for state in frame.states
-            for rule in (*state.first, *state.then)
+            for rule in frame.rules
             if rule.once
         }
         self.aims = {
@@ -236,9 +235,7 @@ class _FrameCompiler:
         return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
     def _names(self) -> list[str]:
-        if self.frame.steps:
-            return [step.name for step in self.frame.steps]
-        return [rule.name for state in self.frame.states for rule in (*state.first, *state.then)]
+        return [one.name for one in self.frame.steps or self.frame.rules]
 
     def _counter(self, name: str) -> int:
         self.shared.rules.append(name)
@@ -261,14 +258,12 @@ class _FrameCompiler:
         """The address of what rules of `first` do after the body action that they have chosen."""
         to = self._expressions(Facts())
         for rule in self.later.rules:
-            following = Label()
             mark = to.block.taken
             to.block.span = rule.span
-            to.block.test(Op.IF_EQ, *self.later.is_pending(rule), following)
-            self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
-            to.block.span = rule.span
-            self._go(to, rule, follow=False)
-            to.block.bind(following)
+            with to.block.when(Op.IF_EQ, *self.later.is_pending(rule)):
+                self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+                to.block.span = rule.span
+                self._go(to, rule, follow=False)
             to.block.release(mark)
         if self.later.rules:
             to.block.halt()  # where none of them is pending
@@ -440,28 +435,27 @@ class _FrameCompiler:
 
         Where a round does not begin, on to its exit; where the entry does not, on to the label that is returned.
         """
-        block, left, inside = to.block, Label(), Label()
+        block, left = to.block, Label()
         when = self.frame.steps[k].when
         if when is None and not any(nested.when or nested.going or nested.until for nested in begun):
             return left
-        block.test(Op.IF_EQ, self.clock, constant(0), inside)
-        for i, nested in enumerate(begun):
-            begins = Label()
-            for inner in begun[i + 1 :]:  # else a round of these begins, within one of the others
-                if inner.rounds > 1:
-                    block.test(Op.IF_EQ, self.rounds[inner.register], constant(0), begins)
-            another = Label()
-            if nested.rounds > 1:
-                block.test(Op.IF_EQ, self.rounds[nested.register], constant(0), another)
-            self._enter(to, nested, exits[id(nested)])
-            if nested.rounds > 1:
-                block.skip(begins)
-                block.bind(another)
-                self._unless_over(to, nested, exits[id(nested)])
-            block.bind(begins)
-        if when is not None:
-            to.sited_condition(when, left)
-        block.bind(inside)
+        with block.when(Op.IF_EQ, self.clock, constant(0)):
+            for i, nested in enumerate(begun):
+                begins = Label()
+                for inner in begun[i + 1 :]:  # else a round of these begins, within one of the others
+                    if inner.rounds > 1:
+                        block.test(Op.IF_EQ, self.rounds[inner.register], constant(0), begins)
+                another = Label()
+                if nested.rounds > 1:
+                    block.test(Op.IF_EQ, self.rounds[nested.register], constant(0), another)
+                self._enter(to, nested, exits[id(nested)])
+                if nested.rounds > 1:
+                    block.skip(begins)
+                    block.bind(another)
+                    self._unless_over(to, nested, exits[id(nested)])
+                block.bind(begins)
+            if when is not None:
+                to.sited_condition(when, left)
         return left
 
     def _be_in(self, to: Expressions, entry: int, *asked: object) -> bool:

@@ -92,11 +92,7 @@ def _note(to: Expressions, registers: Registers, value: Drawn, nothing: Label) -
     register = registers.add(value.path, value.type, fleeting=True)
     mark = block.taken
     if value.type.kind == "bool":
-        false = Label()
-        block.emit(Op.LOAD, register, constant(0))
-        to.sited_condition(value.value, false)
-        block.emit(Op.LOAD, register, constant(1))
-        block.bind(false)
+        to.note_whether(register, value.value)
     else:
         to.failed = nothing
         store(registers, block.emit, value.path, to.sited_copy(value.value))

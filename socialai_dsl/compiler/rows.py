@@ -65,10 +65,8 @@ def _place_among(to: Emitter, keys: tuple[int, ...], key: int, otherwise: Label 
     block = to.block
     place = to.into_temporary(Op.LOAD, constant(0 if otherwise is None else -1))
     for i, each in enumerate(keys):
-        following = Label()
-        block.test(Op.IF_EQ, key, constant(each), following)
-        block.emit(Op.LOAD, place, constant(i))
-        block.bind(following)
+        with block.when(Op.IF_EQ, key, constant(each)):
+            block.emit(Op.LOAD, place, constant(i))
     if otherwise is not None:
         block.test(Op.IF_LE, constant(0), place, otherwise)
         block.emit(Op.MAX, place, place, constant(0))

@@ -142,11 +142,8 @@ class Places:
         done = Label()
         *others, last = Side
         for side in others:
-            following = Label()
-            block.test(Op.IF_EQ, drawn, constant(side), following)
-            block.emit(Op.B_WALL, board, side, region.margin)
-            block.skip(done)
-            block.bind(following)
+            with block.when(Op.IF_EQ, drawn, constant(side), then=done):
+                block.emit(Op.B_WALL, board, side, region.margin)
         block.emit(Op.B_WALL, board, last, region.margin)
         block.bind(done)
 
@@ -278,13 +275,11 @@ def _drawn_status(to: Expressions, entity: Entity) -> None:
     drawn = entity.initial if entity.role == "object" else entity.kind_drawn
     if drawn is None:
         return
-    pinned = Label()
     register = entity_register(entity.number, Field.STATUS)
     mark = to.block.taken
     to.block.span = entity.span
-    to.block.test(Op.IF_UNPINNED, register, 0, pinned)
-    to.block.emit(Op.LOAD, register, to.value(drawn))
-    to.block.bind(pinned)
+    with to.block.when(Op.IF_UNPINNED, register, 0):
+        to.block.emit(Op.LOAD, register, to.value(drawn))
     to.block.release(mark)
 
 
@@ -293,10 +288,8 @@ def _not_yet(to: Expressions, register: int) -> None:
     name = next(name for name in to.registers.names if name.register == register)
     if name.low <= 0 <= name.high:
         return
-    pinned = Label()
-    to.block.test(Op.IF_UNPINNED, register, 0, pinned)
-    to.block.emit(Op.LOAD, register, constant(name.low))
-    to.block.bind(pinned)
+    with to.block.when(Op.IF_UNPINNED, register, 0):
+        to.block.emit(Op.LOAD, register, constant(name.low))
 
 
 def first_state(frame: FramePlan) -> int:
@@ -318,15 +311,13 @@ def _side(to: Expressions, register: Register, path: str, bounds: tuple[int, int
     block = to.block
     low, high = bounds
     result = block.temporary()
-    pinned, done = Label(), Label()
-    block.test(Op.IF_UNPINNED, register, 0, pinned)
-    if low == high:
-        block.emit(Op.LOAD, result, constant(low))
-    else:
-        block.emit(Op.DRAW, result, constant(high - low + 1), to.sites.row(path))
-        block.emit(Op.ADD, result, result, constant(low))
-    block.skip(done)
-    block.bind(pinned)
+    done = Label()
+    with block.when(Op.IF_UNPINNED, register, 0, then=done):
+        if low == high:
+            block.emit(Op.LOAD, result, constant(low))
+        else:
+            block.emit(Op.DRAW, result, constant(high - low + 1), to.sites.row(path))
+            block.emit(Op.ADD, result, result, constant(low))
     block.emit(Op.MAX, result, register, constant(low))
     block.emit(Op.MIN, result, result, constant(high))
     block.bind(done)
@@ -437,11 +428,9 @@ class ComputedStatuses:
     def fix(self, to: Expressions) -> None:
         """Emit those that never change, each unless a layout gives the status."""
         for item in self.fixed:
-            pinned = Label()
             to.block.span = item.condition.span
-            to.block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0, pinned)
-            _settle(to, item)
-            to.block.bind(pinned)
+            with to.block.when(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0):
+                _settle(to, item)
 
     def settle(self, to: Expressions) -> None:
         """Emit those that can change, each after those it reads."""

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import IntEnum
 from itertools import pairwise, product
 from math import prod
+from typing import Any
 
 import numpy as np
 
@@ -190,7 +192,7 @@ class Tables:
         words = []
         first_row = 0
         for made, frame in zip(frames, self.checked.frames, strict=True):
-            row = dict.fromkeys(FrameColumn, 0) | {
+            row = {
                 FrameColumn.ENTITY: frame.entity,
                 FrameColumn.STATE: self.registers.by_path[f"{frame.member}.frame"],
                 FrameColumn.CLOCK: self.registers.by_path[f"{frame.member}.clock"],
@@ -201,7 +203,7 @@ class Tables:
                 FrameColumn.DEFERRED: made.deferred,
             }
             first_row += len(made.rows)
-            words += [row[column] for column in FrameColumn if column != FrameColumn.COLUMNS]
+            words += _in_columns(FrameColumn, row)
         return words
 
     def _line_rows(self) -> list[int]:
@@ -217,9 +219,14 @@ class Tables:
                 LineColumn.CLASS: number + (SECRET if line in lines.kept_secret else 0),
                 LineColumn.NOUN: noun,
             }
-            words += [row[column] for column in LineColumn if column != LineColumn.COLUMNS]
+            words += _in_columns(LineColumn, row)
             first_token += len(tokens)
         return words
+
+
+def _in_columns(columns: type[IntEnum], row: Mapping[Any, int]) -> list[int]:
+    """A row of a table, whose last column says only how many there are; 0 where nothing is given."""
+    return [row.get(column, 0) for column in columns if column.name != "COLUMNS"]
 
 
 class _TypeTable:
@@ -228,8 +235,8 @@ class _TypeTable:
     def __init__(self, checked: CheckedScenario) -> None:
         self.rows: list[list[int]] = []
         self.deadly = 0
-        self.agent = self._add(code=EMPTY, status=0, toggled=0)
-        self.npc = self._add(code=NPC, status=0, toggled=0, transparent=1)
+        self.agent = self._add({TypeColumn.CODE: EMPTY})
+        self.npc = self._add({TypeColumn.CODE: NPC, TypeColumn.TRANSPARENT: 1})
         self._first: dict[ObjectType, int] = {}
         for kind in [
             *(e.type for e in checked.entities if e.type),
@@ -238,46 +245,28 @@ class _TypeTable:
             if kind not in self._first:
                 self._first[kind] = self._object(kind)
 
-    def _add(
-        self,
-        code: int,
-        status: int,
-        toggled: int,
-        orientation: int = 0,
-        walkable: int = 0,
-        transparent: int = 0,
-        pushed: int = 0,
-        rolls: int = 0,
-    ) -> int:
-        row = {
-            TypeColumn.CODE: code,
-            TypeColumn.STATUS: status,
-            TypeColumn.ORIENTATION: orientation,
-            TypeColumn.WALKABLE: walkable,
-            TypeColumn.TRANSPARENT: transparent,
-            TypeColumn.TOGGLED: toggled,
-            TypeColumn.PUSHED: pushed,
-            TypeColumn.ROLLS: rolls,
-        }
-        self.rows.append([row[column] for column in TypeColumn if column != TypeColumn.COLUMNS])
+    def _add(self, row: Mapping[TypeColumn, int]) -> int:
+        self.rows.append(_in_columns(TypeColumn, row))
         return len(self.rows) - 1
 
     def _object(self, kind: ObjectType) -> int:
         self.deadly |= int(kind.deadly) << kind.code
-        rows = [
+        first = len(self.rows)
+        for status in range(len(kind.states)):
+            shown, orientation = kind.shown.get(status, (status, 0))
             self._add(
-                code=kind.code,
-                status=kind.shown.get(status, (status, 0))[0],
-                orientation=kind.shown.get(status, (status, 0))[1],
-                toggled=kind.toggled.get(status, status),
-                walkable=int(status in kind.walkable),
-                transparent=int(status in kind.transparent),
-                pushed=kind.pushed.get(status, status),
-                rolls=1 + kind.initial if status in kind.rolls else 0,
+                {
+                    TypeColumn.CODE: kind.code,
+                    TypeColumn.STATUS: shown,
+                    TypeColumn.ORIENTATION: orientation,
+                    TypeColumn.WALKABLE: int(status in kind.walkable),
+                    TypeColumn.TRANSPARENT: int(status in kind.transparent),
+                    TypeColumn.TOGGLED: kind.toggled.get(status, status),
+                    TypeColumn.PUSHED: kind.pushed.get(status, status),
+                    TypeColumn.ROLLS: 1 + kind.initial if status in kind.rolls else 0,
+                }
             )
-            for status in range(len(kind.states))
-        ]
-        return rows[0]
+        return first
 
     def of(self, entity: Entity) -> int:
         """First row of an entity's type."""
@@ -299,7 +288,7 @@ def _entity_row(entity: Entity, types: _TypeTable, accepts: Mapping[int, int]) -
     }
     if entity.number in accepts:
         row[EntityColumn.ACCEPTS] = accepts[entity.number]
-    return [row[column] for column in EntityColumn if column != EntityColumn.COLUMNS]
+    return _in_columns(EntityColumn, row)
 
 
 def _entity_name(entity: Entity) -> EntityName:

@@ -75,13 +75,12 @@ class Chosen:
 
     def _if_chosen(self, what: Assignment | Effect, value: Term, computed: Callable[[], int]) -> int:
         """A temporary with a value that is computed for one of those, and else is any of its type."""
-        block, skipped = self.to.block, Label()
+        block = self.to.block
         result = self.to.into_temporary(Op.LOAD, self.to.number(value.type.low))
-        block.test(Op.IF_BIT, *_bit(self.bits, self._numbers[id(what)]), skipped)
-        mark = block.taken
-        block.emit(Op.LOAD, result, computed())
-        block.release(mark)
-        block.bind(skipped)
+        with block.when(Op.IF_BIT, *_bit(self.bits, self._numbers[id(what)])):
+            mark = block.taken
+            block.emit(Op.LOAD, result, computed())
+            block.release(mark)
         return result
 
 
@@ -98,8 +97,6 @@ class Choice:
         if only is None:
             yield
             return
-        skipped = Label()
-        self._block.test(Op.IF_BIT, *_bit(self._bits, self._done), skipped)
-        self._done += 1
-        yield
-        self._block.bind(skipped)
+        with self._block.when(Op.IF_BIT, *_bit(self._bits, self._done)):
+            self._done += 1
+            yield

@@ -38,6 +38,7 @@ from socialai_dsl.schema.scenario import Model
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Const, Read, Readings, Term
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import spelt
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +287,7 @@ class _Notes:
             case "do":
                 hindered = self._hindered(note.plan)
                 return f"{words} is not finished" + (f": {hindered}" if hindered else "")
-        values = ", ".join(f"{name} is {_spoken(value)}" for name, value in self.values(part).items())
+        values = ", ".join(f"{name} is {spelt(value)}" for name, value in self.values(part).items())
         return f"{written} is false" + (f": {values}" if values else "")
 
     def _hindered(self, plan: RulePlan | StepPlan | OutcomePlan) -> str | None:
@@ -367,7 +368,7 @@ class _Story:
         """One for each rule that was asked, and for those that would have come after one that fired."""
         counter = 0
         for frame in self.checked.frames:
-            size = len(frame.steps) + sum(len(state.first) + len(state.then) for state in frame.states)
+            size = len(frame.steps) + len(frame.rules)
             yield from self._frame(frame, range(counter, counter + size))
             counter += size
         for number in range(counter, counter + len(self.checked.rules)):
@@ -495,11 +496,4 @@ def _flow(value: Any) -> str:
         return _flow(value[0]) if len(value) == 1 else "[" + ", ".join(map(_flow, value)) + "]"
     if isinstance(value, float):
         return f"{value:g}"
-    return _spoken(value) if isinstance(value, bool) else " ".join(str(value).split())
-
-
-def _spoken(value: Any) -> str:
-    """A value as the scenario would say it."""
-    if value is None:
-        return "nothing"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return spelt(value) if isinstance(value, bool) else " ".join(str(value).split())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -141,6 +141,7 @@ class _Layout:
         self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
         self.addresses = addresses_of(program)
         self.others = ("member", "spoiled", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
+        self.names = [str(entity) for entity in program.entities]
         self.groups: dict[str, list[int]] = {}
         self.carried: dict[int, Any] = {}
         for number, entity in enumerate(program.entities):
@@ -166,6 +167,12 @@ class _Layout:
         self._heard(layout.get("heard"))
         self._pending(layout.get("pending"))
         return self.row
+
+    def _entries(self, key: str, given: Any) -> Iterator[tuple[str, Any]]:
+        """The entries of a mapping, none where nothing is given."""
+        if given:
+            self._mapping(key, given)
+            yield from given.items()
 
     @staticmethod
     def _mapping(key: str, value: Any) -> None:
@@ -224,8 +231,7 @@ class _Layout:
             self.carried[number] = given["carries"]
         inside = given.get("inside")
         if inside is not None:
-            entities = [str(entity) for entity in self.program.entities]
-            self._set(number, Field.INSIDE, word(f"{key}.inside", inside, entities))
+            self._set(number, Field.INSIDE, word(f"{key}.inside", inside, self.names))
         if given.get("gone") or (inside is not None and given.get("at") is None):
             for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1)):
                 self._set(number, field, value)
@@ -239,8 +245,7 @@ class _Layout:
         if given.get("last") is not None:
             self._set(number, Field.LAST, word(f"{key}.last", given["last"], TURN_WORDS))
         if given.get("toggled") is not None:
-            objects = [str(entity) for entity in self.program.entities]
-            self._set(number, Field.TOGGLED, word(f"{key}.toggled", given["toggled"], objects))
+            self._set(number, Field.TOGGLED, word(f"{key}.toggled", given["toggled"], self.names))
         if given.get("pointing") is not None:
             self._set(number, Field.POINTING, self._pointing(f"{key}.pointing", given["pointing"]))
 
@@ -268,10 +273,7 @@ class _Layout:
 
     def _noted(self, place: str, known: Mapping[str, RegisterName], given: Any) -> None:
         """What a member of the cast takes for true, or what looks something has, each in a register of its own."""
-        if not given:
-            return
-        self._mapping(place, given)
-        for key, value in given.items():
+        for key, value in self._entries(place, given):
             if key not in known:
                 raise ValueError(f"{place}: there is no {key!r}{meant(key, known)}")
             if value is not None:
@@ -309,14 +311,11 @@ class _Layout:
             base = FIRST_ENTITY + ENTITY_FIELDS * other
             if other == number or (self.row[base], self.row[base + 1]) != (x, y):
                 continue
-            both_may = {0} & {number, other} and not own_sort and self._npcs_are_hidden()
+            both_may = 0 in (number, other) and not own_sort and bool(self.program.header(Header.FLAGS) & 1)
             over = own_sort and {number, other} & may_lie_over(self.program)
             if (self.program.entities[other].role == "object") == own_sort and not both_may and not over:
                 return other
         return None
-
-    def _npcs_are_hidden(self) -> bool:
-        return bool(self.program.header(Header.FLAGS) & 1)
 
     # --- registers ---
 
@@ -331,10 +330,7 @@ class _Layout:
 
     def _one_of(self, given: Any) -> None:
         """Which of its files a cast member is."""
-        if not given:
-            return
-        self._mapping("one_of", given)
-        for key, value in given.items():
+        for key, value in self._entries("one_of", given):
             name = self.addresses.one_of.get(key)
             if name is None:
                 raise ValueError(f"one_of: {key!r} is not drawn{meant(key, self.addresses.one_of)}")
@@ -363,10 +359,7 @@ class _Layout:
 
     def _world(self, given: Any) -> None:
         """The registers of the scenario's `state`."""
-        if not given:
-            return
-        self._mapping("state", given)
-        for key, value in given.items():
+        for key, value in self._entries("state", given):
             if self._kept(f"state.{key}", value):
                 continue
             if key not in self.addresses.world:
@@ -390,10 +383,7 @@ class _Layout:
 
     def _memory(self, given: Any) -> None:
         """What memories hold, oldest first; the latest act has the last place."""
-        if not given:
-            return
-        self._mapping("memory", given)
-        for key, value in given.items():
+        for key, value in self._entries("memory", given):
             acts = self.addresses.memories.get(key)
             if acts is None:
                 raise ValueError(f"memory: there is no {key!r}{meant(key, self.addresses.memories)}")
@@ -428,8 +418,7 @@ class _Layout:
         if given.get("said") is not None:
             self._said(utterance_number(self.program, given["said"], "last.said"))
         if given.get("poked") is not None:
-            entities = [str(entity) for entity in self.program.entities]
-            self.row[Register.POKED] = word("last.poked", given["poked"], entities)
+            self.row[Register.POKED] = word("last.poked", given["poked"], self.names)
 
     def _said(self, utterance: int) -> None:
         if utterance == 0:
@@ -455,14 +444,11 @@ class _Layout:
         self.row[Register.LOGGED] = min(len(given), size)
 
     def _pending(self, given: Any) -> None:
-        if not given:
-            return
-        self._mapping("pending", given)
         inboxes = {
             str(self.program.entities[row[FrameColumn.ENTITY]]): row[FrameColumn.INBOX]
             for row in self.program.table(Header.FRAME_AT).tolist()
         }
-        for key, classes in given.items():
+        for key, classes in self._entries("pending", given):
             if key not in inboxes:
                 raise ValueError(f"pending: there is no {key!r} who listens{meant(key, inboxes)}")
             size = self.program.header(Header.INBOX_SIZE)
@@ -482,10 +468,9 @@ class _Layout:
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != words:
             raise ValueError(f"{key}: got {given!r}; expected [class, speaker, noun]")
         number, speaker, noun = given
-        entities = [str(entity) for entity in self.program.entities]
         return [
             whole_number(f"{key}[0]", number, 1, highest),
-            word(f"{key}[1]", speaker, entities),
+            word(f"{key}[1]", speaker, self.names),
             -1 if noun is None else self._filling(f"{key}[2]", noun),
         ]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.shipped import IDS
 
 _ENTRY = "socialai_dsl.envs.factory:make_env"

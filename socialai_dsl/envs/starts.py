@@ -74,7 +74,7 @@ def check_starts(loaded: LoadedSuite, suite: ProgramSuite) -> None:
             if at not in seen:
                 seen.add(at)
                 named = key if key != "layout" else "the layout"
-                found.error("S204", f"{named}: {message}", loaded.resolved.key_span(at))
+                found.error("S204", f"{named}: {message}", loaded.resolved.tree.key_span(at))
     found.raise_errors(loaded.resolved.files)
 
 

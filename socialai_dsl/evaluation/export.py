@@ -115,7 +115,8 @@ class Moved:
             UsageError: one lies outside the scenario's folder and what ships.
         """
         from socialai_dsl.diagnostics import DiagnosticBag
-        from socialai_dsl.loader.library import name_source, parse_name, shipped_folder
+        from socialai_dsl.loader.reader import shipped_folder
+        from socialai_dsl.loader.resolved import name_source, parse_name
 
         source = name_source(spec)
         start = source.span(0, 1)

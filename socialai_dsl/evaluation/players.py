@@ -160,7 +160,7 @@ def named_agent(agent: str, scenario: str) -> str:
         UsageError: none ships for it.
     """
     import socialai_dsl
-    from socialai_dsl.loader.library import shipped_folder
+    from socialai_dsl.loader.reader import shipped_folder
 
     if agent != "shipped":
         return agent

@@ -6,9 +6,7 @@ import re
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import Document
-from socialai_dsl.source import Span
+from socialai_dsl.source import Node, Span, Style
 
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n|$)")
 
@@ -28,7 +26,7 @@ class Comment:
     alone: bool
 
 
-def comments_of(document: Document) -> list[Comment]:
+def comments_of(document: Node) -> list[Comment]:
     """The comments of a document, in order."""
     text = document.source.text
     starts, ends = _written(document)
@@ -57,12 +55,12 @@ def _comment_in(line: str, begin: int, starts: list[int], ends: list[int]) -> in
     return None
 
 
-def _written(document: Document) -> tuple[list[int], list[int]]:
+def _written(document: Node) -> tuple[list[int], list[int]]:
     """First indices, and indices behind the last, of the texts in which `#` begins no comment; sorted."""
     lines = [0]
     lines += [match.end() for match in _LINE.finditer(document.source.text) if match.group()]
     areas: list[tuple[int, int]] = []
-    for node in document.spans.values():
+    for node in (part.span for _, part in document.walk()):
         if node.key is not None:
             start = lines[node.key.line - 1] + node.key.column - 1
             areas.append((start, start + node.key.width))

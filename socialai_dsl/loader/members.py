@@ -9,9 +9,9 @@ from itertools import product
 from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.reader import Data, PositionedData
 from socialai_dsl.loader.resolved import ResolvedFile
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import Data, DataPath, Node
+from socialai_dsl.vocabulary import spelt
 
 NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")
 """Keys of a value in a tree; every other key is a parameter below it."""
@@ -43,12 +43,7 @@ class Leaf:
         return ",".join(f"{parameter}={label}" for parameter, label in self.labels.items())
 
 
-def label_of(value: Data) -> str:
-    """How a value of a list is called, and written behind `?`."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def leaves_of(tree: Data, places: PositionedData, found: DiagnosticBag) -> tuple[Leaf, ...]:
+def leaves_of(tree: Data, places: Node, found: DiagnosticBag) -> tuple[Leaf, ...]:
     """The leaves of a tree of the right shape, in reading order; reports S004, S107 and S213.
 
     Args:
@@ -87,7 +82,7 @@ def _listed(values: Data) -> list[Data]:
     return values if isinstance(values, list) else []
 
 
-def _below(node: Data, path: DataPath, places: PositionedData, found: DiagnosticBag) -> list[Leaf]:
+def _below(node: Data, path: DataPath, places: Node, found: DiagnosticBag) -> list[Leaf]:
     """The leaves at and below a value."""
     assert isinstance(node, dict), "internal: a value of a tree that is no mapping has no keys"
     own = Leaf(
@@ -103,15 +98,13 @@ def _below(node: Data, path: DataPath, places: PositionedData, found: Diagnostic
     return leaves
 
 
-def _values(
-    parameter: str, values: Data, path: DataPath, places: PositionedData, found: DiagnosticBag
-) -> list[Leaf]:
+def _values(parameter: str, values: Data, path: DataPath, places: Node, found: DiagnosticBag) -> list[Leaf]:
     """The leaves of one parameter: of each of its values."""
     made: list[Leaf] = []
     labels: list[tuple[str, DataPath, Data]] = (
         [(label, (*path, label), node) for label, node in values.items()]
         if isinstance(values, dict)
-        else [(label_of(value), (*path, i), {}) for i, value in enumerate(_listed(values))]
+        else [(spelt(value), (*path, i), {}) for i, value in enumerate(_listed(values))]
     )
     seen: set[str] = set()
     for label, place, node in labels:
@@ -135,7 +128,7 @@ def _values(
     return made
 
 
-def _joined(own: Leaf, one: Leaf, other: Leaf, places: PositionedData, found: DiagnosticBag) -> Leaf:
+def _joined(own: Leaf, one: Leaf, other: Leaf, places: Node, found: DiagnosticBag) -> Leaf:
     """Two values that are drawn together below `own`; what is said deeper replaces what `own` says."""
     for word in ("scenario", "layout"):
         before, after = getattr(one, word), getattr(other, word)
@@ -207,7 +200,7 @@ def check_splits(suite: ResolvedFile) -> None:
     """
     found = DiagnosticBag()
     if _mapping(suite.data, "tree") is not None:
-        leaves = leaves_of(_part(suite.data, "tree"), suite, DiagnosticBag())
+        leaves = leaves_of(_part(suite.data, "tree"), suite.tree, DiagnosticBag())
         for split in _splits(suite):
             _split_leaves(suite, leaves, split, found)
     else:
@@ -236,14 +229,14 @@ def _with_variants(suite: ResolvedFile, members: Sequence[Member]) -> Sequence[M
 
 def _member(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> Member | None:
     """The scenario that is named at a place; None if something is wrong with it."""
-    entry = suite.part(place) if place[0] != "sweep" else None
+    entry = suite.tree.at(place).data if place[0] != "sweep" else None
     try:
         if not isinstance(entry, dict):
             scenario = suite.include_key(place) if place[0] == "sweep" else suite.include(place)
             member = Member(_called(scenario), scenario, place)
         else:
             named = (*place, "scenario")
-            scenario = suite.include(named).patched(suite, place)
+            scenario = suite.include(named).patched(suite.tree.at(place))
             name = entry.get("name")
             layout = (*place, "layout") if "layout" in entry else None
             member = Member(str(name) if name else _called(scenario), scenario, named, layout=layout)
@@ -265,9 +258,9 @@ def _can_be_played(
     if scenario.kind == "scenario" and not abstract:
         return True
     what = "an abstract scenario" if abstract else f"a file of the kind `{scenario.kind}`"
-    written = place[-1] if place[0] == "sweep" else suite.part(place)
+    written = place[-1] if place[0] == "sweep" else suite.tree.at(place).data
     message = f"`{written}` is {what}; the members of a suite are scenarios"
-    found.error("S108", message, suite.value_span(place))
+    found.error("S108", message, suite.tree.value_span(place))
     return False
 
 
@@ -293,7 +286,7 @@ def _member_places(suite: ResolvedFile, split: str | None) -> list[DataPath]:
 
 def _written_name(suite: ResolvedFile, place: DataPath) -> str:
     """What the file calls a member: its text, or its name."""
-    entry = place[-1] if place[0] == "sweep" else suite.part(place)
+    entry = place[-1] if place[0] == "sweep" else suite.tree.at(place).data
     return str(entry.get("name", entry.get("scenario")) if isinstance(entry, dict) else entry)
 
 
@@ -313,14 +306,14 @@ def _swept(suite: ResolvedFile, place: DataPath, split: str | None, found: Diagn
     combinations = list(product(*([(path, i) for i in range(len(_listed(values[path])))] for path in values)))
     if len(combinations) > MAX_LEAVES:
         message = f"this sweep has {len(combinations)} members; at most {MAX_LEAVES} are played"
-        found.error("S004", message, suite.key_span(("sweep", name)))
+        found.error("S004", message, suite.tree.key_span(("sweep", name)))
         return
     for combination in combinations:
         scenario = member.scenario
-        labels = {path: label_of(_listed(values[path])[i]) for path, i in combination}
+        labels = {path: spelt(_listed(values[path])[i]) for path, i in combination}
         try:
             for path, i in combination:
-                scenario = scenario.with_value(path, suite, ("sweep", name, path, i))
+                scenario = scenario.with_value(path, suite.tree.at(("sweep", name, path, i)))
         except ScenarioError as error:
             found.extend(d for d in error.diagnostics if str(d) not in map(str, found))
             continue
@@ -334,14 +327,14 @@ def _swept(suite: ResolvedFile, place: DataPath, split: str | None, found: Diagn
 
 def _leaf_members(suite: ResolvedFile, split: str | None, found: DiagnosticBag) -> list[Member]:
     tree = _part(suite.data, "tree")
-    leaves = leaves_of(tree, suite, found)
+    leaves = leaves_of(tree, suite.tree, found)
     scenarios: dict[DataPath, ResolvedFile | None] = {}
     for leaf in leaves:
         if leaf.scenario is None:
             place = list(leaf.places.values())[-1] if leaf.places else ("tree",)
             message = f"nothing says which scenario the leaf `{leaf.name}` is"
             hint = "give `scenario: file.yaml` at one of its values, or at the tree's own level"
-            found.error("S105", message, suite.value_span(place), hint=hint)
+            found.error("S105", message, suite.tree.value_span(place), hint=hint)
         elif leaf.scenario not in scenarios:
             scenarios[leaf.scenario] = _included(suite, leaf.scenario, found)
     _check_parameters(suite, tree, leaves, scenarios, found)
@@ -367,7 +360,7 @@ def _leaf_member(
         return None
     try:
         for node in leaf.nodes:
-            scenario = scenario.patched(suite, node)
+            scenario = scenario.patched(suite.tree.at(node))
     except ScenarioError as error:
         known = set(map(str, found))
         found.extend(d for d in error.diagnostics if str(d) not in known)
@@ -375,7 +368,7 @@ def _leaf_member(
     declared = _mapping(scenario.data, "params") or {}
     scenario = scenario.with_params(
         {
-            name: (label, suite.value_span(leaf.places[name]))
+            name: (label, suite.tree.value_span(leaf.places[name]))
             for name, label in leaf.labels.items()
             if name in declared
         }
@@ -402,14 +395,14 @@ def _check_parameters(
             for leaf in below
             for node in leaf.nodes
             for verb in ("set", "add")
-            for path in _mapping(suite.part(node), verb) or {}
+            for path in _mapping(suite.tree.at(node).data, verb) or {}
             for name in (path.removeprefix("params."), "params" if path == "params" else path)
         }
         if parameter not in known | added and "params" not in added and None not in files and files:
             near = did_you_mean(parameter, known)
             hint = None if near else "its values may be mappings that say what they change"
             message = f"no scenario has a parameter `{parameter}`, and its values change nothing"
-            found.error("S206", message, suite.key_span(place), suggestion=near, hint=hint)
+            found.error("S206", message, suite.tree.key_span(place), suggestion=near, hint=hint)
 
 
 def _split_leaves(
@@ -433,7 +426,7 @@ def _split_leaves(
             return tuple(leaves)
         kept = tuple(leaf for leaf in kept if keeps(_has(leaf, wanted)))
     if not kept and leaves:
-        found.error("S504", f"no leaf is in the split `{split}`", suite.key_span(("splits", split)))
+        found.error("S504", f"no leaf is in the split `{split}`", suite.tree.key_span(("splits", split)))
     return kept
 
 
@@ -443,7 +436,7 @@ def _has(leaf: Leaf, wanted: Mapping[str, Data]) -> bool:
 
 
 def _labels(values: Data) -> list[str]:
-    return [label_of(value) for value in (values if isinstance(values, list) else [values])]
+    return [spelt(value) for value in (values if isinstance(values, list) else [values])]
 
 
 def _are_known(
@@ -457,7 +450,7 @@ def _are_known(
     before = len(list(found))
     for parameter, values in wanted.items():
         known = list(dict.fromkeys(leaf.labels[parameter] for leaf in leaves if parameter in leaf.labels))
-        span = suite.key_span((*place, parameter))
+        span = suite.tree.key_span((*place, parameter))
         if not known:
             parameters = list(dict.fromkeys(name for leaf in leaves for name in leaf.labels))
             near = did_you_mean(parameter, parameters)
@@ -470,7 +463,7 @@ def _are_known(
                 hint = None if near else "one of " + ", ".join(known)
                 at = (*place, parameter, i) if isinstance(values, list) else (*place, parameter)
                 message = f"`{label}` is no value of `{parameter}` in the tree"
-                found.error("S504", message, suite.value_span(at), suggestion=near, hint=hint)
+                found.error("S504", message, suite.tree.value_span(at), suggestion=near, hint=hint)
     return len(list(found)) == before
 
 

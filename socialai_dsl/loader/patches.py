@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.loader.library import Node
 from socialai_dsl.loader.reader import MAX_PATCH_PATH
-from socialai_dsl.source import Span
+from socialai_dsl.source import Node, Span
 
 _INDEX: Final = re.compile(r"\[([^\[\]]*)\]")
 _KEY: Final = re.compile(r"[^.\[\]()]+(?:\([^()]*\))?")
@@ -47,7 +46,7 @@ def follow(root: Node, path: str) -> Place | Miss:
         if isinstance(step, Miss):
             return step
         key, end = step
-        part = node.children.get(str(key)) if isinstance(node.children, dict) else dict(node.items()).get(key)
+        part = node.entry(key)
         if end == len(path):
             return Place(node, key, part)
         if part is None:
@@ -148,13 +147,11 @@ class Edit:
         verb: what was done.
         path: to which path of the scenario, as written.
         span: where the patch says so.
-        removed: where what was removed or replaced had been written, if there was something.
     """
 
     verb: Literal["remove", "set", "add"]
     path: str
     span: Span
-    removed: Span | None = None
 
 
 def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
@@ -201,7 +198,7 @@ def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
         place = _existing(root, item.value, item.value_span(), found)
         if place is None or place.node is None:
             continue
-        edit = Edit("remove", item.value, item.value_span(), place.node.key_span())
+        edit = Edit("remove", item.value, item.value_span())
         if any(place.node is earlier.node for earlier, _ in places):
             found.add(Diagnostic("S501", f"`{item.value}` is removed twice", edit.span))
         else:
@@ -228,7 +225,7 @@ def _set(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]
         place.parent.children[str(place.key)] = value
     elif isinstance(place.parent.children, list):
         place.parent.children[int(place.key)] = value
-    return [Edit("set", path, span, place.node.key_span() if place.node else None)]
+    return [Edit("set", path, span)]
 
 
 def _add(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
@@ -311,7 +308,7 @@ def _empty_section(root: Node, path: str, value: Node) -> Node | None:
     """A section that the scenario does not have, made empty; None if there is no section of this name."""
     if not isinstance(root.children, dict) or path not in _MAPPING_SECTIONS | _LIST_SECTIONS:
         return None
-    section = Node(value.document, value.path, {} if path in _MAPPING_SECTIONS else [])
+    section = Node(value.span, children={} if path in _MAPPING_SECTIONS else [])
     root.children[path] = section
     return section
 
@@ -355,7 +352,7 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
         if section is not None and not isinstance(section.children, dict):
             _not_a_mapping(key, section, found)
         for path, node in section.walk() if section is not None else ():
-            if node.children is None and node.value is None and path:
+            if node.is_empty and path:
                 found.add(_nothing_for(path[-1], node))
 
 

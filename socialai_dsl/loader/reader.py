@@ -1,4 +1,4 @@
-"""YAML text to plain data with positions, from the parser's events and within fixed limits."""
+"""Files to positioned trees: found, read once, counted; YAML from the parser's events, within fixed limits."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ import math
 import os
 import re
 import stat
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any, Final, NamedTuple, TypeAlias
+from typing import IO, Any, Final, NamedTuple
 
 import yaml
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError
-from socialai_dsl.loader.offsets import Style, source_indices
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style
 
 MAX_FILE_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 32
@@ -171,125 +169,6 @@ def forbidden_character(character: str, span: Span) -> Diagnostic:
     return Diagnostic("S006", message, span)
 
 
-Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
-
-
-@dataclass(frozen=True, slots=True)
-class NodeSpan:
-    """Where one part of a document stands.
-
-    Attributes:
-        key: place of the key, for an entry of a mapping.
-        value: place of the value; as wide as a scalar on one line, else of width 1.
-        style: how the value is written.
-        flow: whether the value stands inside `{ }` or `[ ]`.
-        start: index in the source's text of a scalar's first character, quotes and block header included.
-        end: index behind its last character.
-    """
-
-    key: Span | None
-    value: Span
-    style: Style
-    flow: bool
-    start: int
-    end: int
-
-
-class PositionedData(ABC):
-    """Data whose parts know where they come from; what does not exist is where its nearest ancestor is."""
-
-    data: Data
-
-    @abstractmethod
-    def find(self, path: DataPath) -> tuple[Document, DataPath]:
-        """The document in which the part at `path` was written, and its path there."""
-
-    def part(self, path: DataPath) -> Data:
-        """The part of the data at `path`, which exists."""
-        part: Data = self.data
-        for step in path:
-            part = part[step]  # type: ignore[index]
-        return part
-
-    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
-        """The place of the character `offset` (from 0) of the text at `path`."""
-        document, there = self.find(path)
-        return document.place_in_scalar(there, offset, width)
-
-    def value_span(self, path: DataPath) -> Span:
-        """The place of the value at `path`."""
-        document, there = self.find(path)
-        return document.node(there).value
-
-    def key_span(self, path: DataPath) -> Span:
-        """The place of the key at `path`; of the value, for an item of a list and for the root."""
-        document, there = self.find(path)
-        node = document.node(there)
-        return node.key or node.value
-
-    def in_flow(self, path: DataPath) -> bool:
-        """Whether the part at `path` stands inside { } or [ ]."""
-        return self.node_span(path).flow
-
-    def node_span(self, path: DataPath) -> NodeSpan:
-        """All that is known about the place of the part at `path`."""
-        document, there = self.find(path)
-        return document.node(there)
-
-
-@dataclass(frozen=True, eq=False)
-class Document(PositionedData):
-    """One YAML file as plain data.
-
-    Attributes:
-        source: its text.
-        data: dicts (keys are always text), lists, str, int, float, bool and None.
-        spans: path -> place, for every part.
-        path: the file itself, resolved; None if the text did not come from a file.
-    """
-
-    source: Source
-    data: Data
-    spans: dict[DataPath, NodeSpan] = field(repr=False)
-    path: Path | None = None
-
-    def find(self, path: DataPath) -> tuple[Document, DataPath]:
-        """This document and `path`, shortened until it exists."""
-        path = tuple(path)
-        while path and path not in self.spans:
-            path = path[:-1]
-        return self, path
-
-    def node(self, path: DataPath) -> NodeSpan:
-        """The place of an existing part."""
-        return self.spans[path]
-
-    def place_in_scalar(self, path: DataPath, offset: int, width: int) -> Span:
-        """The place of one character of an existing scalar; the start of anything else."""
-        node = self.node(path)
-        place = node.value
-        if node.style in (Style.MAPPING, Style.SEQUENCE):
-            return place.shifted(0, width)
-        text = self.source.text
-        raw = text[node.start : node.end]
-        if node.style is Style.PLAIN and "\n" not in raw and "\r" not in raw:
-            return place.shifted(min(max(offset, 0), len(raw)), width)
-        value = self.part(path)
-        assert isinstance(value, str), "internal: what is written as a text is read as one"
-        indices = source_indices(text, node.start, node.end, node.style, value)
-        index = indices[min(max(offset, 0), len(indices) - 1)]
-        return self._span_of(node, index, width)
-
-    def _span_of(self, node: NodeSpan, index: int, width: int) -> Span:
-        before = Source("", self.source.text[node.start : index])
-        *_, (breaks, last) = enumerate(before.lines())
-        column = len(last) + (1 if breaks else node.value.column)
-        return Span(node.value.file, node.value.line + breaks, column, width)
-
-
-Scalar: TypeAlias = str | int | float | bool | None
-
-
 class Plain(NamedTuple):
     """The value of a plain word and, if it is refused, the code, message and help line."""
 
@@ -390,7 +269,7 @@ _NOTHING: Final = ("", "~")
 _STEP: Final = re.compile(r"[^.\[\]]+")
 
 
-def value_at(path: DataPath, text: str) -> Data | None:
+def value_at(path: DataPath, text: str) -> Scalar:
     """The value of a plain word where a text may stand; None where YAML's own reading holds.
 
     Args:
@@ -450,25 +329,24 @@ _TAG_DIRECTIVE = re.compile(r"^%TAG\b", re.MULTILINE)
 _STYLES = {None: Style.PLAIN, "": Style.PLAIN} | {s.value: s for s in Style if len(s.value) == 1}
 
 
-def read_document(file: Path | str | Source, name: str | None = None, path: Path | None = None) -> Document:
+def read_document(file: Path | str | Source, name: str | None = None) -> Node:
     """One YAML document as plain data with positions.
 
     Args:
         file: a path, or text that is there already.
         name: how messages call the file; by default its path relative to the working directory.
-        path: the file that text came from, if `file` is a source.
 
     Raises:
         ScenarioError: everything that is wrong with the file as YAML (S001 to S007), in one go as far as
             the text can be followed.
     """
     if isinstance(file, Source):
-        return _parse(checked(file), path)
+        return _parse(checked(file))
     path = Path(file)
-    return _parse(read_source(path, name or display_name(path)), path.resolve())
+    return _parse(replace(read_source(path, name or display_name(path)), path=path.resolve()))
 
 
-def _parse(source: Source, path: Path | None) -> Document:
+def _parse(source: Source) -> Node:
     builder = _Builder(source)
     try:
         builder.refuse_many_directives()
@@ -480,7 +358,7 @@ def _parse(source: Source, path: Path | None) -> Document:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         builder.found.add(explain(error, source))
     builder.found.raise_errors({source.name: source})
-    return builder.document(path)
+    return builder.root
 
 
 def _events(text: str) -> Iterator[Any]:
@@ -501,11 +379,13 @@ class _Frame:
 
     __slots__ = ("container", "first_lines", "flow", "is_key", "key", "key_span", "path")
 
-    def __init__(self, container: dict[str, Data] | list[Data], path: DataPath, flow: bool) -> None:
+    def __init__(
+        self, container: dict[str, Node] | list[Node], path: DataPath, flow: bool, is_key: bool
+    ) -> None:
         self.container = container
         self.path = path
         self.flow = flow
-        self.is_key = False
+        self.is_key = is_key
         self.key: str | None = None
         self.key_span: Span | None = None
         self.first_lines: dict[str, int] = {}
@@ -516,13 +396,17 @@ class _Frame:
 
 
 class _Builder:
-    """Takes events one by one; nothing in here is recursive."""
+    """Takes events one by one; nothing in here is recursive.
+
+    Attributes:
+        found: what is wrong with the document.
+        root: its tree.
+    """
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.found = DiagnosticBag()
-        self._spans: dict[DataPath, NodeSpan] = {}
-        self._data: Data = None
+        self.root = Node(NodeSpan(source, None, source.span(1, 1), Style.PLAIN, False, 0, 0))
         self._stack: list[_Frame] = []
         self._events = 0
         self._documents = 0
@@ -551,12 +435,6 @@ class _Builder:
             line = self.source.text.count("\n", 0, found[0].start()) + 1
             self._refuse_directives(self.source.span(line, 1))
             raise _LimitError
-
-    def document(self, path: Path | None) -> Document:
-        if not self._spans:
-            start = self.source.span(1, 1)
-            self._spans[()] = NodeSpan(None, start, Style.PLAIN, False, 0, 0)
-        return Document(self.source, self._data, self._spans, path)
 
     def _span(self, event: Any) -> Span:
         start, end = event.start_mark, event.end_mark
@@ -653,22 +531,27 @@ class _Builder:
         assert frame.key is not None, "internal: a value without a key"
         return (*frame.path, frame.key)
 
-    def _value(self, value: Data, event: Any, style: Style) -> DataPath:
-        """Put a value where the next one belongs and return its path."""
-        start, end = event.start_mark, event.end_mark
-        span = self._span(event) if style not in (Style.MAPPING, Style.SEQUENCE) else self._start(event)
+    def _value(self, value: Scalar, event: Any, style: Style) -> None:
+        """Put a scalar where the next value belongs."""
+        self._put(self._node(self._span(event), event, style, value))
+
+    def _node(self, place: Span, event: Any, style: Style, value: Scalar = None) -> Node:
+        """What an event begins, for the place where the next value belongs."""
+        key, flow = (self._stack[-1].key_span, self._stack[-1].flow) if self._stack else (None, False)
+        start, end = event.start_mark.index, event.end_mark.index
+        return Node(NodeSpan(self.source, key, place, style, flow, start, end, value), value)
+
+    def _put(self, node: Node) -> None:
+        """Put a part where the next value belongs."""
         if not self._stack:
-            self._data = value
-            self._spans[()] = NodeSpan(None, span, style, False, start.index, end.index)
-            return ()
-        path, frame = self._path(), self._stack[-1]
+            self.root = node
+            return
+        frame = self._stack[-1]
         if isinstance(frame.container, list):
-            frame.container.append(value)
+            frame.container.append(node)
         else:
-            frame.container[str(path[-1])] = value
-        self._spans[path] = NodeSpan(frame.key_span, span, style, frame.flow, start.index, end.index)
+            frame.container[str(frame.key)] = node
         frame.key = frame.key_span = None
-        return path
 
     def _start(self, event: Any) -> Span:
         mark = event.start_mark
@@ -680,7 +563,7 @@ class _Builder:
     def _sequence(self, event: Any) -> None:
         self._open([], event, Style.SEQUENCE)
 
-    def _open(self, container: dict[str, Data] | list[Data], event: Any, style: Style) -> None:
+    def _open(self, container: dict[str, Node] | list[Node], event: Any, style: Style) -> None:
         self._refuse_properties(event)
         if len(self._stack) == MAX_DEPTH:
             self._stop(f"the file is nested more than {MAX_DEPTH} levels deep", self._start(event))
@@ -689,11 +572,171 @@ class _Builder:
         if frame is not None and is_key:
             self._error("S001", "not YAML: a key is a word, not a list or a mapping", self._start(event))
             frame.key, frame.key_span = "", None
-        opened = _Frame(container, self._value(container, event, style), bool(event.flow_style))
-        opened.is_key = is_key
-        self._stack.append(opened)
+        path, node = self._path(), self._node(self._start(event), event, style)
+        node.children = container
+        self._put(node)
+        self._stack.append(_Frame(container, path, bool(event.flow_style), is_key))
 
     def _end(self, event: Any) -> None:
         closed = self._stack.pop()
         if closed.is_key:
             self._stack[-1].key = ""
+
+
+# -- the files that one scenario may be made of ----------------------------------------------------------------
+
+
+SUFFIXES: Final = (".yaml", ".yml")
+
+
+def shipped_folder() -> Path:
+    """The folder of the scenarios that come with the product, in a checkout as well as installed."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "scenarios"
+    return installed if installed.is_dir() else package.parent / "scenarios"
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """The files of the experiments that come with the product, by name."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "experiments" / "shipped"
+    folder = installed if installed.is_dir() else package.parent / "experiments"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+class Library:
+    """Reads the files of one scenario; none outside `roots` and the shipped folder is ever opened.
+
+    `texts` (resolved path -> text) stand for files that are not on the disk as they are meant.
+
+    Attributes:
+        shipped: the folder of the shipped scenarios, resolved.
+        sources: name -> source, of all files read and of names that findings may point into.
+    """
+
+    def __init__(self, roots: Iterable[Path], texts: Mapping[Path, Source] | None = None) -> None:
+        self.shipped = shipped_folder().resolve()
+        self._roots = [*(root.resolve() for root in roots), self.shipped]
+        self.sources: dict[str, Source] = {}
+        self._texts = texts or {}
+        self._documents: dict[Path, Node] = {}
+        self._bytes = 0
+
+    def error(
+        self, code: str, message: str, span: Span, hint: str | None = None, suggestion: str | None = None
+    ) -> ScenarioError:
+        """The exception for one finding, with the sources read so far."""
+        finding = Diagnostic(code, message, span, hint=hint, suggestion=suggestion)
+        return ScenarioError([finding], self.sources)
+
+    def resolved(self, path: Path, asked: Span) -> Path:
+        """The file itself, links followed, if it may be read.
+
+        Raises:
+            ScenarioError: S505 at `asked` if it lies outside the folders.
+        """
+        try:
+            real = path.resolve()
+        except (OSError, RuntimeError, ValueError):
+            raise self.error("S505", f"`{path.name}` cannot be followed to a file", asked) from None
+        if not any(real.is_relative_to(root) for root in self._roots):
+            inside = display_name(self._roots[0])
+            hint = f"files may be taken from {inside}, folders in it, and the shipped scenarios"
+            raise self.error("S505", f"`{path.name}` lies outside the scenario's folder", asked, hint=hint)
+        return real
+
+    def find(self, text: str, folder: Path, asked: Span) -> Path:
+        """The file that a scenario file names: beside it, else among the shipped ones; `.yaml` may be left out.
+
+        Raises:
+            ScenarioError: S504 at `asked` if there is none, S505 if it may not be read.
+        """
+        if not text.strip() or not text.isprintable() or "\\" in text:
+            raise self.error(
+                "S504", "this is not the name of a file", asked, hint="folders are divided by `/`"
+            )
+        spellings = [text] if text.endswith(SUFFIXES) else [text + ".yaml", text]
+        for place in dict.fromkeys((folder, self.shipped)):
+            for spelling in spellings:
+                real = self.resolved(place / spelling, asked)
+                if real in self._texts or is_file(real):
+                    return real
+        near = did_you_mean(text, self._names_in((folder / text).parent, text, asked))
+        raise self.error(
+            "S504", f"there is no file `{text}` in {display_name(folder)}", asked, suggestion=near
+        )
+
+    def _names_in(self, folder: Path, text: str, asked: Span) -> list[str]:
+        """Names of the scenario files in a folder, written as `text` is."""
+        prefix = text[: text.rfind("/") + 1]
+        names = yaml_files(self.resolved(folder, asked))
+        return [prefix + (name if text.endswith(SUFFIXES) else name.rsplit(".", 1)[0]) for name in names]
+
+    def matching(self, text: str, folder: Path, asked: Span) -> list[Path]:
+        """The files that a name with `*` in its last part stands for, sorted by name.
+
+        Raises:
+            ScenarioError: S504 at `asked` if there is none, S505 if one may not be read, S507 if there are too many.
+        """
+        head, _, pattern = text.rpartition("/")
+        if "\\" in text or not text.isprintable() or "*" in head:
+            raise self.error(
+                "S504", "this is not the name of files", asked, hint="`*` may stand in the last part"
+            )
+        place = self.resolved(folder / head, asked)
+        names = [name for name in yaml_files(place) if _fits(name, pattern)]
+        if not names:
+            raise self.error("S504", f"no file matches `{text}`", asked)
+        if len(names) > MAX_FILES:
+            raise self.error("S507", f"`{text}` matches more than {MAX_FILES} files", asked)
+        return [self.resolved(place / name, asked) for name in names]
+
+    def read(self, path: Path, asked: Span | None = None) -> Node:
+        """A file as a tree of its own, free to be changed; each is read once.
+
+        Args:
+            path: the file, resolved.
+            asked: where its name is written; None for the file that was named from outside.
+
+        Raises:
+            ScenarioError: what is wrong with the file; S505 and S507 at `asked`.
+        """
+        if path in self._documents:
+            return self._documents[path].copy()
+        start = asked or Span(display_name(path), 1, 1)
+        if asked is not None:
+            self.resolved(path, asked)
+        if len(self._documents) == MAX_FILES:
+            raise self.error("S507", f"a scenario is made of at most {MAX_FILES} files", start)
+        source = replace(self._texts.get(path) or read_source(path, display_name(path)), path=path)
+        self._bytes += len(source.text)
+        if self._bytes > MAX_TOTAL_BYTES:
+            message = f"the files of a scenario have more than {MAX_TOTAL_BYTES >> 20} MiB together"
+            raise self.error("S507", message, start)
+        self.sources[source.name] = source
+        self._documents[path] = read_document(source)
+        return self._documents[path].copy()
+
+
+def _fits(name: str, pattern: str) -> bool:
+    """Whether a name is the pattern with something in the place of each `*`, in time proportional to both.
+
+    Each piece between two stars is taken where it first stands: a later place would leave less for the rest.
+    """
+    first, *middle, last = pattern.split("*") if "*" in pattern else (pattern, "")
+    if not (name.startswith(first) and name.endswith(last)) or len(name) < len(first) + len(last):
+        return False
+    at, end = len(first), len(name) - len(last)
+    for piece in middle:
+        at = name.find(piece, at, end) + len(piece)
+        if at < len(piece):
+            return False
+    return "*" in pattern or name == pattern
+
+
+def yaml_files(folder: Path) -> list[str]:
+    """The names of the YAML files in a folder, sorted; none if it cannot be listed."""
+    try:
+        return sorted(name for name in os.listdir(folder) if name.endswith(SUFFIXES))
+    except OSError:
+        return []

@@ -1,4 +1,4 @@
-"""A scenario's data as one tree: `extends`, variants and the files that it names put together."""
+"""A scenario of a name as one tree: `extends`, variants and the files that it names put together."""
 
 from __future__ import annotations
 
@@ -9,23 +9,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.library import (
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
+from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant
+from socialai_dsl.loader.reader import (
+    MAX_CHAIN,
+    MAX_DEPTH,
+    MAX_NAME,
+    SUFFIXES,
     Library,
-    Node,
-    Part,
-    ScenarioName,
-    looks_like_path,
-    merge,
-    name_source,
-    parse_name,
+    display_name,
+    is_file,
     shipped_folder,
-    tree_of,
     yaml_files,
 )
-from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant
-from socialai_dsl.loader.reader import MAX_CHAIN, MAX_DEPTH, Document, PositionedData, display_name, is_file
-from socialai_dsl.source import DataPath, Source, Span
+from socialai_dsl.source import DataPath, Node, Source, Span
 
 KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment")
 """The kinds of file; exactly one of these keys is present."""
@@ -34,6 +31,126 @@ ANY: Final = "any"
 """What a variant that fits every scenario is `of`."""
 
 _DECLARED_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,80}")
+
+
+# -- names ---------------------------------------------------------------------------------------------------
+
+
+_VARIANT: Final = re.compile(r"[A-Za-z0-9_-]{1,80}")
+_PARAMETER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A piece of a name and where it stands."""
+
+    text: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class ScenarioName:
+    """A scenario's name, taken apart.
+
+    Attributes:
+        base: a path or the name of a shipped scenario.
+        variants: the variants to apply, in order.
+        params: parameter -> value as written.
+    """
+
+    base: Part
+    variants: tuple[Part, ...]
+    params: dict[str, Part]
+
+
+def looks_like_path(text: str) -> bool:
+    """Whether a name is meant as a file rather than as a shipped scenario."""
+    return "/" in text or "\\" in text or text.endswith(SUFFIXES)
+
+
+def name_source(text: str) -> Source:
+    """A name from outside any file (a command line, a call) as a source that findings can point into."""
+    return Source("scenario name", text)
+
+
+def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None = None) -> ScenarioName:
+    """Take a name apart; what cannot be understood is added to `found` as S508.
+
+    Args:
+        text: the name.
+        start: where its first character stands.
+        found: takes the findings.
+        folder: where relative paths start, if a file whose name holds `+` or `?` shall be recognised.
+    """
+    if not text.strip() or len(text) > MAX_NAME or not text.isprintable():
+        found.add(Diagnostic("S508", "a scenario's name is one line of visible characters", start))
+        return ScenarioName(Part("", start), (), {})
+
+    question = len(text) if _is_file(text, folder) else _index(text, "?", 0)
+    plus = question if _is_file(text[:question], folder) else _plus(text, question)
+    variants = _pieces(text, "+", plus + 1, question, start)
+    for variant in variants:
+        if not _VARIANT.fullmatch(variant.text):
+            found.add(Diagnostic("S508", "a variant's name is made of letters, digits and `_`", variant.span))
+    params = {}
+    for piece in _pieces(text, "&", question + 1, len(text), start):
+        key, equals, value = piece.text.partition("=")
+        if not equals or not _PARAMETER.fullmatch(key):
+            found.add(Diagnostic("S508", f"`{piece.text}` is not of the form parameter=value", piece.span))
+        elif key in params:
+            found.add(Diagnostic("S508", f"the parameter `{key}` is given twice", piece.span))
+        else:
+            params[key] = Part(value, piece.span)
+    return ScenarioName(_part(text, 0, plus, start), variants, params)
+
+
+def _is_file(text: str, folder: Path | None) -> bool:
+    return folder is not None and is_file(folder / text)
+
+
+def _index(text: str, character: str, begin: int) -> int:
+    found = text.find(character, begin)
+    return len(text) if found < 0 else found
+
+
+def _plus(text: str, question: int) -> int:
+    """The first `+` of the last part of the path."""
+    return min(question, _index(text, "+", text.rfind("/", 0, question) + 1))
+
+
+def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tuple[Part, ...]:
+    """`text[begin:end]` split at the separator; nothing if `begin` lies behind `end`."""
+    pieces = []
+    while begin <= end:
+        stop = min(end, _index(text, separator, begin))
+        pieces.append(_part(text, begin, stop, start))
+        begin = stop + 1
+    return tuple(pieces)
+
+
+def _part(text: str, begin: int, end: int, start: Span) -> Part:
+    return Part(text[begin:end], start.shifted(begin, max(1, end - begin)))
+
+
+# -- bases and variants --------------------------------------------------------------------------------------
+
+
+def merge(base: Node, over: Node, key: str = "") -> Node:
+    """`base` overlaid with `over`: mappings are merged key by key, all else is replaced.
+
+    Keys of the base keep their place, those that only `over` has follow in its order. Of a grammar, `nouns` and `slots`
+    replace each other. Both trees are used up; `key` is where in their files they stand.
+    """
+    if not isinstance(base.children, dict) or not isinstance(over.children, dict):
+        return over
+    for former, instead in (("nouns", "slots"), ("slots", "nouns")):
+        if key == "grammar" and instead in over.children and former not in over.children:
+            base.children.pop(former, None)
+    for word, part in over.children.items():
+        below = base.children.get(word)
+        base.children[word] = part if below is None else merge(below, part, word)
+    over.children = base.children
+    return over
 
 
 @dataclass
@@ -136,7 +253,7 @@ class Builder:
 
     def read(self, path: Path, asked: Span | None) -> tuple[Node, str]:
         """A file as a tree of its own, and its kind; a variant's shape is checked, since no model sees it."""
-        root = tree_of(self.library.read(path, asked))
+        root = self.library.read(path, asked)
         kind = self._kind(root)
         if kind == "variant":
             found = DiagnosticBag()
@@ -290,7 +407,7 @@ def _down_to(builder: Builder, build: Build, path: Path, variant: Part) -> list[
         base = patch.text("of")
         if base is None or base == ANY:
             break
-        asked = patch.document.value_span(("of",))
+        asked = patch.value_span(("of",))
         path = builder.library.find(base, path.parent, asked)
     return patches
 
@@ -347,15 +464,14 @@ def names_in(folder: Path) -> list[str]:
     return [name.rsplit(".", 1)[0] for name in yaml_files(folder) if not _is_of_any(folder / name)]
 
 
-class ResolvedFile(PositionedData):
+class ResolvedFile:
     """A scenario (or suite, npc, library) with `extends` and variants applied.
-
-    Behaves like a document; its parts know in which file they were written, patches included.
 
     Attributes:
         name: canonical name with variants, without parameters, e.g. `talkitout+unsocial`.
         kind: key of the file's kind; `variant` only for a variant of any scenario that was named alone.
-        data: the data; `extends` is gone, `abstract` is the file's own.
+        tree: its parts, each of which knows where it was written, patches included.
+        data: the same as plain data; `extends` is gone, `abstract` is the file's own.
         params: parameter -> value as written behind `?`.
         edits: what variants changed, in order.
     """
@@ -363,18 +479,13 @@ class ResolvedFile(PositionedData):
     def __init__(self, builder: Builder, build: Build, given: Mapping[str, Part]) -> None:
         self.name = build.name
         self.kind = build.kind
-        self.data = build.tree.data()
+        self.tree = build.tree
+        self.data = build.tree.data
         self.params = {key: part.text for key, part in given.items()}
         self.edits = tuple(build.edits)
         self._builder = builder
         self._build = build
         self._given = given
-        self._parts = dict(build.tree.walk())
-
-    @property
-    def document(self) -> PositionedData:
-        """The data with its positions, which is this object itself."""
-        return self
 
     @property
     def files(self) -> dict[str, Source]:
@@ -411,29 +522,12 @@ class ResolvedFile(PositionedData):
         """The exception for one finding, with the sources read so far."""
         return self._builder.library.error(code, message, span, hint, suggestion)
 
-    def find(self, path: DataPath) -> tuple[Document, DataPath]:
-        """The file and the path in it where the part at `path`, or its nearest ancestor, was written."""
-        path = tuple(path)
-        while path not in self._parts:
-            path = path[:-1]
-        part = self._parts[path]
-        return part.document, part.path
-
-    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
-        """The place of a character of the text at `path`; of a parameter's value, where it is put in."""
-        part = self._parts.get(path)
-        return super().locate(path, 0 if part is not None and part.substituted else offset, width)
-
     def changed(self, *steps: Callable[[Node], None]) -> ResolvedFile:
         """This scenario after steps that change its tree."""
         build = self._build.copy()
         for step in steps:
             step(build.tree)
         return ResolvedFile(self._builder, build, self._given)
-
-    def origin(self, path: DataPath) -> Span:
-        """Where the value at `path` was written."""
-        return self.value_span(path)
 
     def param_span(self, name: str) -> Span:
         """Where the parameter was given a value, in the name of the scenario."""
@@ -445,12 +539,10 @@ class ResolvedFile(PositionedData):
         Raises:
             ScenarioError: whatever is wrong with the name or the file.
         """
-        document, there = self.find(path)
-        library = self._builder.library
-        text = self.part(path)
-        if not isinstance(text, str):
-            raise library.error("S104", "the name of a file is a text", document.value_span(there))
-        return self._named(text, document.locate(there), _folder(document))
+        node = self.tree.at(path)
+        if not isinstance(node.value, str):
+            raise self.error("S104", "the name of a file is a text", node.value_span())
+        return self._named(node.value, node.locate(), _folder(node))
 
     def include_key(self, path: DataPath) -> ResolvedFile:
         """The scenario that the key at `path` names, relative to the file that the key stands in.
@@ -458,8 +550,8 @@ class ResolvedFile(PositionedData):
         Raises:
             ScenarioError: whatever is wrong with the name or the file.
         """
-        document, there = self.find(path)
-        return self._named(str(path[-1]), document.key_span(there), _folder(document))
+        node = self.tree.at(path)
+        return self._named(str(path[-1]), node.key_span(), _folder(node))
 
     def _named(self, text: str, start: Span, folder: Path) -> ResolvedFile:
         """The file of a name that is written in a file."""
@@ -478,14 +570,13 @@ class ResolvedFile(PositionedData):
         Raises:
             ScenarioError: whatever is wrong with a name or a file.
         """
-        part = self.part(path)
-        if isinstance(part, list):
-            return tuple(file for i in range(len(part)) for file in self.include_all((*path, i)))
-        if not isinstance(part, str) or "*" not in part:
+        node = self.tree.at(path)
+        if isinstance(node.children, list):
+            return tuple(file for i in range(len(node.children)) for file in self.include_all((*path, i)))
+        if not isinstance(node.value, str) or "*" not in node.value:
             return (self.include(path),)
-        document, there = self.find(path)
-        span = document.value_span(there)
-        files = self._builder.library.matching(part, _folder(document), span)
+        span = node.value_span()
+        files = self._builder.library.matching(node.value, _folder(node), span)
         names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
 
@@ -514,13 +605,11 @@ class ResolvedFile(PositionedData):
     def _npc_files(self, place: DataPath) -> list[ResolvedFile]:
         """The npc files that are named at `place`; those that others build on are left out of a pattern."""
         found: list[ResolvedFile] = []
-        part = self.part(place)
-        places = [(*place, i) for i in range(len(part))] if isinstance(part, list) else [place]
+        named = self.tree.at(place).children
+        places = [(*place, i) for i in range(len(named))] if isinstance(named, list) else [place]
         for one in places:
-            files = self.include_all(one)
+            files, span = self.include_all(one), self.tree.value_span(one)
             for file in files:
-                document, there = self.find(one)
-                span = document.value_span(there)
                 if file.kind != "npc":
                     message = (
                         f"`{file.path.name}` is a file of the kind `{file.kind}`; only npc files can be drawn"
@@ -545,33 +634,26 @@ class ResolvedFile(PositionedData):
             return None
         return ResolvedFile(self._builder, build, self._given)
 
-    def patched(self, holder: PositionedData, path: DataPath) -> ResolvedFile:
-        """This scenario changed by the mapping (`remove`, `set`, `add`) at `path` of another file.
+    def patched(self, change: Node) -> ResolvedFile:
+        """This scenario changed by a mapping (`remove`, `set`, `add`) of another file.
 
         Raises:
             ScenarioError: S501, S502, S104.
         """
-        build = self._build.copy()
-        document, there = holder.find(path)
-        patch = Node(document, there, document.part(there))
+        build, patch = self._build.copy(), change.copy()
         if isinstance(patch.children, dict):
             patch.children = {verb: part for verb, part in patch.children.items() if verb in PATCH_VERBS}
         self._builder.patch(build, patch)
         return ResolvedFile(self._builder, build, self._given)
 
-    def with_value(self, path: str, holder: PositionedData, place: DataPath) -> ResolvedFile:
-        """This scenario with the value at `place` of another file set at a path of it.
+    def with_value(self, path: str, value: Node) -> ResolvedFile:
+        """This scenario with a value of another file set at a path of it.
 
         Raises:
             ScenarioError: S501, S004.
         """
-        build = self._build.copy()
-        document, there = holder.find(place)
-        patch, values = Node(document, there, {}), Node(document, there, {})
-        values.children = {path: Node(document, there, document.part(there))}
-        patch.children = {"set": values}
-        self._builder.patch(build, patch)
-        return ResolvedFile(self._builder, build, self._given)
+        values = Node(value.span, children={path: value})
+        return self.patched(Node(value.span, children={"set": values}))
 
     def with_params(self, values: Mapping[str, tuple[str, Span]]) -> ResolvedFile:
         """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
@@ -618,9 +700,9 @@ def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | No
     return ResolvedFile(builder, build, name.params)
 
 
-def _folder(document: Document) -> Path:
-    assert document.path is not None, "internal: a library's documents are files"
-    return document.path.parent
+def _folder(part: Node) -> Path:
+    assert part.source.path is not None, "internal: a library's documents are files"
+    return part.source.path.parent
 
 
 def _named_file(part: Part, folder: Path, source: Source, texts: Mapping[Path, Source]) -> Path:

@@ -6,8 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.loader.library import shipped_folder
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import read_document, shipped_folder
+from socialai_dsl.vocabulary import spelt
 
 IDS: Final = {
     "TalkItOut": "talkitout",
@@ -136,13 +136,9 @@ def _parameters(name: str) -> dict[str, tuple[str, ...]]:
         default = said.get("default")
         if isinstance(values, dict):  # names of values, of which the default may be written as either
             default = next((name for name, value in values.items() if value == default), default)
-        found[parameter] = tuple(dict.fromkeys(map(_written, (default, *values))))
+        found[parameter] = tuple(dict.fromkeys(map(spelt, (default, *values))))
     removed = {path.removeprefix("params.") for path in content.get("remove") or ()}
     return {parameter: values for parameter, values in found.items() if parameter not in removed}
-
-
-def _written(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _stands_alone(content: dict[str, Any]) -> bool:

@@ -16,7 +16,7 @@ from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending, endings_of
 from socialai_dsl.replay.state import cast_of, played, present
 from socialai_dsl.replay.steps import describe_step
-from socialai_dsl.vocabulary import DIRECTIONS
+from socialai_dsl.vocabulary import DIRECTIONS, spelt
 
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
 """What `describe` says of somebody that is shown otherwise, or only counts."""
@@ -236,6 +236,4 @@ def _looks(state: dict[str, Any]) -> dict[str, str]:
 def _plain(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key} {_plain(part)}" for key, part in value.items())
-    if value is None:
-        return "nothing"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return spelt(value)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.source import Source
 

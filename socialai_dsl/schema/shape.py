@@ -22,7 +22,7 @@ from socialai_dsl.schema.annotations import (
     model_at,
 )
 from socialai_dsl.schema.scenario import FirstRule, Npc, Register, Scenario, State, Step, ThenRule, WorldRule
-from socialai_dsl.source import DataPath, Positions, Span
+from socialai_dsl.source import Data, DataPath, Node, Span
 
 _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
 """Keys of rules, which are mostly written inside { }."""
@@ -30,159 +30,94 @@ _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in mode
 
 @dataclass
 class Repaired:
-    """A document that has been changed into what was probably meant.
+    """A document that is changed into what was probably meant; its parts still know where they are written.
 
     Attributes:
-        data: the document, changed.
-        moved: path as it is now -> where it is written.
+        tree: the document.
         lost: paths of parts that were left out although they may have meant something.
     """
 
-    data: Any
-    moved: dict[DataPath, DataPath] = field(default_factory=dict)
+    tree: Node
     lost: list[DataPath] = field(default_factory=list)
 
     def rename(self, path: DataPath, key: str) -> bool:
         """Read the entry at `path` under another key; whether that key was free."""
-        parent = self._parent(path)
-        if parent is None or key in parent:
+        siblings = self._siblings(path)
+        if siblings is None or (key in siblings and not siblings[key].left_out):
             return False
-        entries = [(key if k == path[-1] else k, value) for k, value in parent.items()]
-        parent.clear()
-        parent.update(entries)
-        self.moved[(*path[:-1], key)] = written(path, self.moved)
+        entries = [(key if k == path[-1] else k, part) for k, part in siblings.items() if k != key]
+        siblings.clear()
+        siblings.update(entries)
         return True
-
-    def move(self, path: DataPath, to: DataPath) -> None:
-        """Read the entry at `path` as if it were written at `to`, in a mapping that has no such key."""
-        part_at(self.data, to[:-1])[to[-1]] = part_at(self.data, path[:-1]).pop(path[-1])
-        self.moved[to] = written(path, self.moved)
 
     def leave_out(self, path: DataPath) -> None:
         """Go on without the entry at `path`; an item of a list stays, since the others are known by their number."""
-        parent = self._parent(path)
-        if parent is not None:
-            del parent[path[-1]]
+        siblings = self._siblings(path)
+        if siblings is not None:
+            siblings[str(path[-1])].left_out = True
         self.lost.append(path)
 
-    def _parent(self, path: DataPath) -> dict[str | int, Any] | None:
+    def _siblings(self, path: DataPath) -> dict[str, Node] | None:
         """The mapping that holds the entry at `path`; None if there is no such entry, or not any more."""
-        part = self.data
-        for step in path[:-1]:
-            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
-            if step not in known:
-                return None
-            part = part[step]
-        return part if isinstance(part, dict) and path[-1] in part else None
+        around = [self.tree.get(path[:length]) for length in range(len(path) + 1)]
+        if any(part is None or part.left_out for part in around):
+            return None
+        siblings = self.tree.at(path[:-1]).children
+        return siblings if isinstance(siblings, dict) else None
 
 
-def part_at(data: Any, path: DataPath) -> Any:
-    """The part of a document at a path that exists."""
-    for step in path:
-        data = data[step]
-    return data
-
-
-def copied(data: Any) -> Any:
-    """A copy whose mappings and lists are free to be changed."""
-    if isinstance(data, Mapping):
-        return {key: copied(value) for key, value in data.items()}
-    return [copied(value) for value in data] if isinstance(data, list) else data
-
-
-def fill_gaps(repaired: Repaired, places: Positions, bag: DiagnosticBag, path: DataPath = ()) -> None:
+def fill_gaps(repaired: Repaired, bag: DiagnosticBag, path: DataPath = ()) -> None:
     """Report every key and list item without a value, and what a comma inside { } has cut off."""
-    part = part_at(repaired.data, path)
-    if isinstance(part, list):
-        for i, item in enumerate(part):
-            if item is None:
-                _report_nothing((*path, i), places, bag)
-                part[i] = ""
-        children: list[str | int] = list(range(len(part)))
-    elif isinstance(part, dict):
-        _join_cut_values(repaired, part, path, places, bag)
-        children = list(part)
-    else:
-        return
-    for child in children:
-        fill_gaps(repaired, places, bag, (*path, child))
+    part = repaired.tree.at(path)
+    if isinstance(part.children, dict):
+        _join_cut_values(repaired, part.children, path, bag)
+    for key, child in list(part.items()):
+        if child.is_empty and isinstance(part.children, list):
+            _report_nothing(key, child, bag)
+            child.value = ""
+        fill_gaps(repaired, bag, (*path, key))
 
 
 def _join_cut_values(
-    repaired: Repaired, part: dict[str, Any], path: DataPath, places: Positions, bag: DiagnosticBag
+    repaired: Repaired, entries: dict[str, Node], path: DataPath, bag: DiagnosticBag
 ) -> None:
     before: str | None = None
-    cut: dict[str, list[str]] = {}
-    for key, value in list(part.items()):
-        if value is not None:
+    cut: dict[str, list[tuple[str, Node]]] = {}
+    for key, part in list(entries.items()):
+        if not part.is_empty:
             before = key
-        elif (
-            before is not None
-            and isinstance(part[before], str)
-            and _looks_cut(key, part[before], path, places)
-        ):
-            cut.setdefault(before, []).append(key)
-            del part[key]
+            continue
+        head = entries[before].value if before is not None else None
+        if before is not None and isinstance(head, str) and _looks_cut(key, part, head, path):
+            cut.setdefault(before, []).append((key, part))
+            del entries[key]
         else:
-            _report_nothing((*path, key), places, bag)
+            _report_nothing(key, part, bag)
             repaired.leave_out((*path, key))
     for key, pieces in cut.items():
-        head = part[key]
-        part[key] = ", ".join([head, *pieces])
-        hint = f'write `{key}: "{part[key]}"`, or put every key on a line of its own'
-        word, space, rest = pieces[0].partition(" ")
+        head = entries[key].value
+        whole = ", ".join([str(head), *(piece for piece, _ in pieces)])
+        entries[key].value = whole
+        first, part = pieces[0]
+        hint = f'write `{key}: "{whole}"`, or put every key on a line of its own'
+        word, space, rest = first.partition(" ")
         if space and word in _KEYS:
             hint = f"a colon is missing: write `{word}: {rest}`"
-        message = (
-            f"unknown key `{pieces[0]}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
-        )
-        bag.error("S102", message, places.key_span((*path, pieces[0])), hint=hint)
+        message = f"unknown key `{first}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
+        bag.error("S102", message, part.key_span(), hint=hint)
 
 
-def _looks_cut(key: str, before: str, path: DataPath, places: Positions) -> bool:
+def _looks_cut(key: str, part: Node, before: str, path: DataPath) -> bool:
     """Whether a key without a value is the rest of the value before it."""
-    if not places.in_flow((*path, key)):
+    if not part.span.flow:
         return False
     in_text = path[-1:] == ("with",) or (isinstance(path[-1], int) and key not in _KEYS) if path else False
     return in_text or not key.isidentifier() or before.count("(") > before.count(")")
 
 
-def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> None:
-    key = path[-1]
+def _report_nothing(key: str | int, part: Node, bag: DiagnosticBag) -> None:
     what = "an item of this list is empty" if isinstance(key, int) else f"nothing is given for `{key}`"
-    bag.error("S104", what, places.key_span(path), hint="write a value, or leave the key out")
-
-
-def written(path: DataPath, moved: Mapping[DataPath, DataPath]) -> DataPath:
-    """Where the part that is now at a path is written."""
-    for length in range(len(path), 0, -1):
-        if path[:length] in moved:
-            return (*moved[path[:length]], *path[length:])
-    return path
-
-
-@dataclass(frozen=True)
-class MovedPlaces:
-    """Positions of a document some of whose entries are written elsewhere: path as it is now -> where it is written."""
-
-    places: Positions
-    moved: Mapping[DataPath, DataPath]
-
-    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
-        """The place of a character of the text at `path`."""
-        return self.places.locate(written(path, self.moved), offset, width)
-
-    def value_span(self, path: DataPath) -> Span:
-        """The place of the value at `path`."""
-        return self.places.value_span(written(path, self.moved))
-
-    def key_span(self, path: DataPath) -> Span:
-        """The place of the key at `path`."""
-        return self.places.key_span(written(path, self.moved))
-
-    def in_flow(self, path: DataPath) -> bool:
-        """Whether the part at `path` stands inside { } or [ ]."""
-        return self.places.in_flow(written(path, self.moved))
+    bag.error("S104", what, part.key_span(), hint="write a value, or leave the key out")
 
 
 # -- keys that stand one level too far left or right ---------------------------------------------------------
@@ -192,66 +127,60 @@ _EXTENDS = "extends"
 """A key that is gone when the models see a file."""
 
 
-def mend_indentation(
-    model: type[BaseModel], repaired: Repaired, places: Positions, bag: DiagnosticBag
-) -> None:
+def mend_indentation(model: type[BaseModel], tree: Node, bag: DiagnosticBag) -> None:
     """Move keys that are indented one level too little or too much; reports S101 once for keys that follow each other.
 
     Args:
         model: what the document should be.
-        repaired: the document; changed.
-        places: where its parts stand.
+        tree: the document; changed.
         bag: takes the findings.
     """
-    _Mender(model, repaired, places, bag).mend(())
+    _Mender(model, tree, bag).mend(())
 
 
 class _Mender:
-    def __init__(
-        self, model: type[BaseModel], repaired: Repaired, places: Positions, bag: DiagnosticBag
-    ) -> None:
+    def __init__(self, model: type[BaseModel], tree: Node, bag: DiagnosticBag) -> None:
         self._model = model
-        self._repaired = repaired
-        self._places = MovedPlaces(places, repaired.moved)
+        self._tree = tree
         self._bag = bag
         self._quiet = False
 
     def mend(self, path: DataPath) -> None:
         """Mend what stands at and below a path, the outermost first."""
-        part = part_at(self._repaired.data, path)
-        if isinstance(part, list):
-            for i in range(len(part)):
+        part = self._tree.at(path)
+        if isinstance(part.children, list):
+            for i in range(len(part.children)):
                 self.mend((*path, i))
-        if not isinstance(part, dict) or self._places.in_flow((*path, next(iter(part), ""))):
+        if not isinstance(part.children, dict) or next(iter(part.children.values()), part).span.flow:
             return
-        self._indent(path, part)
-        self._dedent(path, part)
-        for key in list(part):
-            if key in part:
+        self._indent(path, part.children)
+        self._dedent(path, part.children)
+        for key in list(part.children):
+            if key in part.children:
                 self.mend((*path, key))
 
-    def _indent(self, path: DataPath, part: dict[str, Any]) -> None:
+    def _indent(self, path: DataPath, entries: dict[str, Node]) -> None:
         """Move keys that belong into the entry above them."""
         above: str | None = None
         moving = False
-        for key in list(part):
-            emptied = above is not None and part[above] is None and key in self._words_of((*path, above))
-            if self._fits(path, key, part[key]) and not emptied:
+        for key, part in list(entries.items()):
+            emptied = above is not None and entries[above].is_empty and key in self._words_of((*path, above))
+            if self._fits(path, key, part) and not emptied:
                 above, moving = key, False
-            elif above is not None and self._takes((*path, above), part[above], key, part[key]):
+            elif above is not None and self._takes((*path, above), entries[above], key, part):
                 if not moving:
                     message = f"`{key}` belongs to `{above}`, but is not indented further than it"
-                    self._report((*path, key), message, "indent it one level further")
+                    self._report(part, message, "indent it one level further")
                 moving = True
-                part[above] = {} if part[above] is None else part[above]
-                self._move((*path, key), (*path, above, key))
+                entries[above].children = entries[above].children or {}
+                self._move((*path, key), (*path, above))
 
-    def _dedent(self, path: DataPath, part: dict[str, Any]) -> None:
+    def _dedent(self, path: DataPath, entries: dict[str, Node]) -> None:
         """Move keys that belong beside the entry that they stand in, or further out."""
         known = model_at(self._model, path)
         moving = False
-        for key in list(part):
-            home = None if self._fits(path, key, part[key]) else self._home(path, known, key, part[key])
+        for key, part in list(entries.items()):
+            home = None if self._fits(path, key, part) else self._home(path, known, key, part)
             if home is None:
                 moving = False
                 continue
@@ -260,33 +189,36 @@ class _Mender:
                 where = CALLED[owner] if owner in CALLED else f"`{home[-1]}`"
                 inside = f"`{path[-1]}`" if isinstance(path[-1], str) else "an item of a list"
                 message = f"`{key}` stands in {inside}, but belongs to {where}"
-                self._report((*path, key), message, "indent it less")
+                self._report(part, message, "indent it less")
             moving = True
-            self._move((*path, key), (*home, key))
+            self._move((*path, key), home)
 
     def _move(self, path: DataPath, to: DataPath) -> None:
-        """Move an entry; what stands wrong in it does so for the same reason."""
-        self._repaired.move(path, to)
+        """Move an entry into another mapping; what stands wrong in it does so for the same reason."""
+        key, before, after = str(path[-1]), self._tree.at(path[:-1]).children, self._tree.at(to).children
+        assert isinstance(before, dict), "internal: what is moved is an entry"
+        assert isinstance(after, dict), "internal: entries are moved into mappings"
+        after[key] = before.pop(key)
         quiet, self._quiet = self._quiet, True
-        self.mend(to)
+        self.mend((*to, key))
         self._quiet = quiet
 
-    def _home(self, path: DataPath, known: type[BaseModel] | None, key: str, value: Any) -> DataPath | None:
+    def _home(self, path: DataPath, known: type[BaseModel] | None, key: str, part: Node) -> DataPath | None:
         """The mapping further out that lacks a key which does not fit at `path`."""
         for length in range(len(path) - 1, -1, -1):
             outer = path[:length]
-            around = part_at(self._repaired.data, outer)
+            around = self._tree.at(outer).children
             if not isinstance(around, dict) or key in around:
                 continue
             owner = model_at(self._model, outer)
             if owner is not None and key in keys_of(owner):
                 return outer
             elements = _elements(annotation_at(self._model, outer))
-            if owner is None and known in elements and (value == {} or _looks_like(value, elements)):
+            if owner is None and known in elements and (part.children == {} or _looks_like(part, elements)):
                 return outer
         return None
 
-    def _fits(self, path: DataPath, key: str, value: Any) -> bool:
+    def _fits(self, path: DataPath, key: str, part: Node) -> bool:
         """Whether a key may stand where it stands, also if it is misspelt."""
         known = model_at(self._model, path)
         if known is not None:
@@ -295,9 +227,9 @@ class _Mender:
         annotation = annotation_at(self._model, path)
         elements = _elements(annotation)
         held = _held(annotation)
-        if value == {} or _looks_like(value, elements) or any(get_origin(part) is dict for part in held):
+        if part.children == {} or _looks_like(part, elements) or any(get_origin(one) is dict for one in held):
             return True
-        if not isinstance(value, dict | list) and len(elements) < len(held):
+        if part.children is None and len(elements) < len(held):
             return True  # an expression, say
         return not held or not self._is_word_of(path, elements, key)
 
@@ -311,23 +243,26 @@ class _Mender:
         owner = model_at(self._model, path)
         return keys_of(owner) if owner is not None else []
 
-    def _takes(self, above: DataPath, value: Any, key: str, given: Any) -> bool:
-        """Whether the entry above can have the key."""
-        if value is not None and (not isinstance(value, dict) or key in value or self._closed(above, value)):
+    def _takes(self, path: DataPath, above: Node, key: str, part: Node) -> bool:
+        """Whether the entry above, at a path, can have the key."""
+        if not above.is_empty and (
+            not isinstance(above.children, dict) or key in above.children or _is_closed(above.children)
+        ):
             return False
-        owner = model_at(self._model, above)
+        owner = model_at(self._model, path)
         if owner is not None:
             return key in keys_of(owner)
-        annotation = annotation_at(self._model, above)
-        return _looks_like(given, _elements(annotation)) or (value is None and bool(_held(annotation)))
+        annotation = annotation_at(self._model, path)
+        return _looks_like(part, _elements(annotation)) or (above.is_empty and bool(_held(annotation)))
 
-    def _closed(self, path: DataPath, value: dict[str, Any]) -> bool:
-        """Whether a mapping is written in braces, so that nothing on other lines can belong to it."""
-        return not value or self._places.in_flow((*path, next(iter(value))))
-
-    def _report(self, path: DataPath, message: str, hint: str) -> None:
+    def _report(self, part: Node, message: str, hint: str) -> None:
         if not self._quiet:
-            self._bag.error("S101", message, self._places.key_span(path), hint=hint)
+            self._bag.error("S101", message, part.key_span(), hint=hint)
+
+
+def _is_closed(entries: dict[str, Node]) -> bool:
+    """Whether a mapping is written in braces, so that nothing on other lines can belong to it."""
+    return not entries or next(iter(entries.values())).span.flow
 
 
 def _held(annotation: Any) -> list[Any]:
@@ -341,9 +276,10 @@ def _elements(annotation: Any) -> list[type[BaseModel]]:
     return [held for held in _held(annotation) if isinstance(held, type) and issubclass(held, BaseModel)]
 
 
-def _looks_like(value: Any, models: list[type[BaseModel]]) -> bool:
+def _looks_like(part: Node, models: list[type[BaseModel]]) -> bool:
     """Whether a mapping has keys of one of some models."""
-    return isinstance(value, dict) and any(key in keys_of(model) for model in models for key in value)
+    keys = part.children if isinstance(part.children, dict) else ()
+    return any(key in keys_of(model) for model in models for key in keys)
 
 
 # -- models --------------------------------------------------------------------------------------------------
@@ -358,21 +294,18 @@ class ShapedFile(Generic[M]):
 
     Attributes:
         model: None if not even the rest of the file can be used.
-        data: the document the model was made from, with mistakes of shape repaired.
-        places: where its parts stand.
+        tree: the document the model was made from, with mistakes of shape repaired.
         lost: whether something was left out that other parts of the file may name.
     """
 
     model: M | None
-    data: Any
-    places: Positions
+    tree: Node
     lost: bool
 
 
 def model_of(
     model: type[M],
-    data: object,
-    places: Positions,
+    tree: Node,
     bag: DiagnosticBag,
     *,
     partial: bool = False,
@@ -384,34 +317,31 @@ def model_of(
 
     Args:
         model: what it should be.
-        data: plain data of a document.
-        places: where its parts stand.
+        tree: the document.
         bag: takes the findings.
         partial: missing keys are fine, as in a base that others build on; the model is then None.
         parameters: `$name` that is left may stand for anything: that there is no such parameter has been said, or a
             scenario will give it.
     """
-    repaired = Repaired(copied(data))
+    repaired = Repaired(tree.copy())
     known = len(bag)
-    made = _tried(model, repaired.data)
+    made = _tried(model, repaired.tree.data)
     if made is None:
-        mend_indentation(model, repaired, places, bag)
-    found: Positions = MovedPlaces(places, repaired.moved)
-    fill_gaps(repaired, found, bag)
+        mend_indentation(model, repaired.tree, bag)
+    fill_gaps(repaired, bag)
     if made is not None and len(bag) == known:
-        return ShapedFile(made, repaired.data, places, False)
+        return ShapedFile(made, repaired.tree, False)
     try:
-        made = _made(model, repaired.data)
+        made = _made(model, repaired.tree.data)
     except ValidationError as error:
-        _Report(model, repaired, found, bag, partial, parameters).add_all(error)
-        made = _tried(model, repaired.data)
-        if made is None and model is Scenario and not partial and isinstance(repaired.data, dict):
-            missing = [key for key in _STAND_INS if key not in repaired.data]
+        _Report(model, repaired, bag, partial, parameters).add_all(error)
+        data = repaired.tree.data
+        made = _tried(model, data)
+        if made is None and model is Scenario and not partial and isinstance(data, dict):
+            missing = [key for key in _STAND_INS if key not in data]
             repaired.lost += [(key,) for key in missing]
-            made = _tried(model, repaired.data | {key: _STAND_INS[key] for key in missing})
-    lost = any(_matters(path) for path in repaired.lost)
-    kept = found if repaired.moved else places
-    return ShapedFile(made, repaired.data, kept, lost)
+            made = _tried(model, data | {key: _STAND_INS[key] for key in missing})
+    return ShapedFile(made, repaired.tree, any(_matters(path) for path in repaired.lost))
 
 
 def _made(model: type[M], data: object) -> M:
@@ -426,7 +356,7 @@ def _tried(model: type[M], data: object) -> M | None:
     return None
 
 
-_STAND_INS: Final[Mapping[str, object]] = {
+_STAND_INS: Final[dict[str, Data]] = {
     "scenario": "unnamed",
     "grammar": {"templates": ["Hello"]},
     "room": {"size": 30},
@@ -470,15 +400,14 @@ class _Report:
         self,
         model: type[BaseModel],
         repaired: Repaired,
-        places: Positions,
         bag: DiagnosticBag,
         partial: bool,
         parameters: bool,
     ) -> None:
         self._model = model
         self._repaired = repaired
-        self._data = copied(repaired.data)
-        self._places = places
+        self._places = repaired.tree.copy()
+        self._data = self._places.data
         self._bag = bag
         self._partial = partial
         self._parameters = parameters
@@ -555,7 +484,8 @@ class _Report:
 
     def _left_over(self, parent: DataPath, key: str, known: list[str]) -> str | None:
         """Where a mapping needs all its keys, an unknown one stands for one that is missing."""
-        given = set(part_at(self._data, parent))
+        given = self._places.at(parent).data
+        assert isinstance(given, dict), "internal: only a mapping misses a key"
         extra = [word for word in self._extra[parent] if did_you_mean(word, known) is None]
         missing = [word for word in known if word not in given]
         return dict(zip(extra, missing, strict=False)).get(key)

@@ -65,7 +65,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.semantics.texts import words_in_order
-from socialai_dsl.source import DataPath, Positions
+from socialai_dsl.source import DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES
 
 _Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
@@ -337,10 +337,9 @@ MAX_CHANGES: Final = 2048
 def check_meaning(
     scenario: Scenario,
     name: str,
-    places: Positions,
+    places: Node,
     bag: DiagnosticBag,
     prelude: Prelude,
-    data: object,
     params: Mapping[str, Scalar] | None = None,
 ) -> CheckedScenario | None:
     """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
@@ -362,7 +361,7 @@ def check_meaning(
     checked: CheckedScenario | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
-        findings = Findings(found, places, params or {}, data)
+        findings = Findings(found, places, params or {})
         if AGENT not in scenario.cast:
             _no_agent(scenario, findings, places)
             break
@@ -385,7 +384,7 @@ def check_meaning(
     return None if found.has_errors else checked
 
 
-def _no_agent(scenario: Scenario, findings: Findings, places: Positions) -> None:
+def _no_agent(scenario: Scenario, findings: Findings, places: Node) -> None:
     """There is nobody to act; perhaps because the name is misspelt."""
     message = "the cast has no `agent`"
     if (near := did_you_mean(AGENT, scenario.cast)) is not None:
@@ -490,15 +489,12 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
-        asked = probes(resolver)
+        asked = probes(resolver) if self._scenario.probes else ()
         for rule in rules:
             self._look_at_size(rule)
         for plan in plans:
-            for state in plan.states:
-                for one in (*state.first, *state.then):
-                    self._look_at_size(one)
-            for step in plan.steps:
-                self._look_at_size(step)
+            for one in plan.causing:
+                self._look_at_size(one)
         if findings.bag.has_errors:
             return None
         for plan in plans:

@@ -23,7 +23,7 @@ from socialai_dsl.schema.experiment import (
     Tested,
     one_setting,
 )
-from socialai_dsl.source import DataPath, Positions
+from socialai_dsl.source import DataPath, Node
 
 MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""
@@ -72,7 +72,7 @@ class Cell:
 def cells_of(
     experiment: Experiment,
     profile: str | None,
-    places: Positions,
+    places: Node,
     bag: DiagnosticBag,
     whole: bool = True,
 ) -> tuple[Cell, ...]:
@@ -132,7 +132,7 @@ class _Draft:
 class _Expansion:
     """Writes out one experiment."""
 
-    def __init__(self, experiment: Experiment, places: Positions, bag: DiagnosticBag, whole: bool) -> None:
+    def __init__(self, experiment: Experiment, places: Node, bag: DiagnosticBag, whole: bool) -> None:
         self._experiment = experiment
         self._places = places
         self._bag = bag

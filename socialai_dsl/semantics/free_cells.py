@@ -76,14 +76,6 @@ def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
     return found
 
 
-_COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-}
-
-
 class Known:
     """What is known when a term is asked for its value; None stands for what is not.
 
@@ -113,13 +105,10 @@ class Known:
                 return self.size[("width", "height").index(name)]
             case terms.Operation(op=op, args=args) if op != "turn":
                 known = [value for value in map(self.value, args) if value is not None]
-                if len(known) < len(args):
-                    return None
-                # As in a room: dividing by nothing gives 0.
-                return 0 if op in ("//", "%") and known[1] == 0 else compute(op, *known)
+                return compute(op, *known) if len(known) == len(args) else None
             case terms.Compare(op=op, left=left, right=right):
                 a, b = self.value(left), self.value(right)
-                return None if a is None or b is None else int(_COMPARISONS[op](a, b))
+                return None if a is None or b is None else int(terms.COMPARISONS[op](a, b))
             case terms.Not(arg=arg):
                 truth = self.value(arg)
                 return None if truth is None else int(not truth)

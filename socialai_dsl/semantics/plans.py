@@ -169,6 +169,11 @@ class StatePlan:
     then: tuple[RulePlan, ...]
     span: Span
 
+    @property
+    def rules(self) -> tuple[RulePlan, ...]:
+        """All of them, in the order written."""
+        return (*self.first, *self.then)
+
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
@@ -234,6 +239,22 @@ class FramePlan:
     """False: nobody wrote it; it is there for who only believes something."""
     nesting: tuple[int | NestedSteps, ...] = ()
     """Where some entries of `steps` are nested: their numbers in order, without those of `for: 0`."""
+
+    @property
+    def rules(self) -> tuple[RulePlan, ...]:
+        """The rules of all states, in the order written."""
+        return tuple(rule for state in self.states for rule in state.rules)
+
+    @property
+    def causing(self) -> tuple[RulePlan | StepPlan, ...]:
+        """Its parts that have effects."""
+        return (*self.steps, *self.rules)
+
+    @property
+    def activities(self) -> tuple[Activity, ...]:
+        """Everything that the member may do."""
+        own = (*(step.activity for step in self.steps), *(state.activity for state in self.states))
+        return (*own, *(rule.do for rule in self.rules if rule.do is not None))
 
     @property
     def order(self) -> tuple[int | NestedSteps, ...]:
@@ -510,3 +531,8 @@ class CheckedScenario:
     readings: Readings | None = field(default=None, compare=False, repr=False)
     addressing: tuple[str, tuple[int, ...]] | None = None
     overheard: bool = True
+
+    @property
+    def causing(self) -> tuple[RulePlan | StepPlan, ...]:
+        """Everything that has effects."""
+        return (*self.rules, *(one for frame in self.frames for one in frame.causing))

@@ -158,8 +158,7 @@ def _check_states(
 
 
 def _targets(state: State) -> list[str]:
-    rules = (*state.first, *state.then)
-    return [target for rule in rules for target in (rule.goto, rule.goto_now) if target is not None]
+    return [target for rule in state.rules for target in (rule.goto, rule.goto_now) if target is not None]
 
 
 def _reachable(start: str, targets: dict[str, list[str]]) -> set[str]:
@@ -363,26 +362,22 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     nothing is left to be played: no success, or no room.
     """
     possible = Possible(checked)
-    for span, conditions in _by_place(_rules(checked)):
-        if (why := possible.never(conditions)) is not None:
-            findings.warning("W311", "this rule never fires: its condition can never hold", span, hint=why)
-    for span, conditions in _by_place(_conditions_of_steps(checked)):
-        if (why := possible.never(conditions)) is not None:
-            findings.warning("W314", "these steps are always left out: this can never hold", span, hint=why)
-    for span, conditions in _by_place(_untils(checked)):
-        if (why := possible.never(conditions)) is not None:
-            findings.warning("W314", "this step can never end: `until` can never hold", span, hint=why)
+    probes = ((probe.when.span, probe.when) for probe in checked.probes if probe.when is not None)
+    looked_at = (
+        ("W311", "this rule never fires: its condition can never hold", _rules(checked)),
+        ("W314", "these steps are always left out: this can never hold", _conditions_of_steps(checked)),
+        ("W314", "this step can never end: `until` can never hold", _untils(checked)),
+        ("W314", "there are never any of those: this can never hold", _those(checked)),
+        ("W314", "this probe is never asked: `when` can never hold", probes),
+    )
+    for code, message, found in looked_at:
+        for span, conditions in _by_place(found):
+            if (why := possible.never(conditions)) is not None:
+                findings.warning(code, message, span, hint=why)
     for span, conditions in _by_place(_those(checked)):
-        if (why := possible.never(conditions)) is not None:
-            findings.warning("W314", "there are never any of those: this can never hold", span, hint=why)
-        elif possible.always(conditions):
+        if possible.never(conditions) is None and possible.always(conditions):
             hint = "the name of the group alone means all of them"
             findings.warning("W319", "those are all of them: this always holds", span, hint=hint)
-    for probe in checked.probes:
-        if probe.when is not None and (why := possible.never([probe.when])) is not None:
-            findings.warning(
-                "W314", "this probe is never asked: `when` can never hold", probe.when.span, hint=why
-            )
     for required in checked.require:
         if (why := possible.never([required])) is not None:
             message = "no room is played: what it has to be like can never hold"
@@ -411,9 +406,7 @@ def _by_place(found: Iterable[tuple[Span, Sited]]) -> Iterator[tuple[Span, list[
 
 
 def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
-    in_frames = (
-        rule for frame in checked.frames for state in frame.states for rule in (*state.first, *state.then)
-    )
+    in_frames = (rule for frame in checked.frames for rule in frame.rules)
     for rule in (*in_frames, *checked.rules):
         if rule.when is not None:
             yield rule.when.span, rule.when
@@ -682,11 +675,5 @@ class _Statuses:
 
 
 def _effects(checked: CheckedScenario) -> Iterator[Effect]:
-    rules: list[RulePlan] = list(checked.rules)
-    for frame in checked.frames:
-        for step in frame.steps:
-            yield from step.causes
-        for state in frame.states:
-            rules += (*state.first, *state.then)
-    for rule in rules:
-        yield from rule.causes
+    for plan in checked.causing:
+        yield from plan.causes

@@ -33,9 +33,8 @@ def probes(resolver: Resolver) -> tuple[ProbePlan, ...]:
     try:
         return tuple(_plans(resolver))
     finally:
-        del remembered[
-            known:
-        ]  # what only probes ask about the step before is no part of the scenario's program
+        # What only probes ask about the step before is no part of the scenario's program.
+        del remembered[known:]
 
 
 def _plans(resolver: Resolver) -> Iterator[ProbePlan]:

@@ -243,15 +243,11 @@ def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     groups = [resolver.symbols.group_of(member) for member in members if member is not None]
     if len(groups) == 2 and groups[0] is not None and groups[1] is not None and groups[0][0] == groups[1][0]:
         first = who.type.low - groups[0][1]
-        return (
-            number(who.value - first)
-            if isinstance(who, Const)
-            else arithmetic("-", as_number(who), number(first))
-        )
-    objects = resolver.symbols.object_of(who.type.low)
-    if objects is None or who.type.high not in objects.numbers:
-        raise resolver.fail("S204", "only one of a group has an `index`, its place in it", node, scope)
-    first = objects.numbers[0]
+    else:
+        objects = resolver.symbols.object_of(who.type.low)
+        if objects is None or who.type.high not in objects.numbers:
+            raise resolver.fail("S204", "only one of a group has an `index`, its place in it", node, scope)
+        first = objects.numbers[0]
     if isinstance(who, Const):
         return number(who.value - first)
     return arithmetic("-", as_number(who), number(first))
@@ -596,18 +592,13 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     if isinstance(node.subject, ast.Name):
         owner = node.subject.id
         if owner == "here" and node.name in ("x", "y") and scope.here:
-            _, high = resolver.symbols.width if node.name == "x" else resolver.symbols.height
-            return Here(Type("int", 0, high - 1), "x" if node.name == "x" else "y")
+            return _cell_coordinate(resolver, node.name)
         several = scope.variables.get(owner)
         if isinstance(several, Variable) and node.name not in VALUES:
             found = _of_each(resolver, several, node.name)
             if found is not None:
                 return found
-        if (
-            owner not in scope.variables
-            and owner in resolver.symbols.scenario.let
-            and node.name not in VALUES
-        ):
+        if several is None and owner in resolver.symbols.scenario.let and node.name not in VALUES:
             found = _of_each(resolver, resolver.value(node.subject, None, scope), node.name)
             if found is not None:
                 return found

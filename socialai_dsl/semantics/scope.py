@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
@@ -35,7 +35,7 @@ from socialai_dsl.semantics.terms import (
     one_of,
     where_there_is,
 )
-from socialai_dsl.source import DataPath, Positions, Span
+from socialai_dsl.source import Data, DataPath, Node, Span
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Scalar = int | bool | float | str
@@ -59,31 +59,25 @@ class Findings:
 
     Attributes:
         bag: takes the findings.
-        places: path -> place in the file.
+        places: the document, whose parts know where they are written.
         params: the file's parameters with their values, for `$name`.
-        data: the document, to tell one value from a list of one.
         unknown: the names that were found to mean nothing where they stand.
     """
 
     bag: DiagnosticBag
-    places: Positions
+    places: Node
     params: Mapping[str, Scalar] = field(default_factory=dict)
-    data: object = None
     unknown: set[str] = field(default_factory=set)
 
-    def part(self, path: DataPath) -> object:
-        """The text at `path`; None without one."""
-        part: Any = self.data
-        for step in path:
-            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
-            if step not in known:
-                return None
-            part = part[step]
-        return part
+    def part(self, path: DataPath) -> Data:
+        """What is written at `path`; None if there is nothing."""
+        part = self.places.get(path)
+        return part.data if part is not None else None
 
     def is_list(self, path: DataPath) -> bool:
         """Whether a list is written at `path`."""
-        return isinstance(self.part(path), list)
+        part = self.places.get(path)
+        return part is not None and isinstance(part.children, list)
 
     def each(self, path: DataPath, values: Iterable[V]) -> Iterator[tuple[DataPath, V]]:
         """The values at `path` with their paths; one may stand there without being a list."""

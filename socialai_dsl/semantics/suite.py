@@ -9,10 +9,10 @@ from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.resolver import texts_of
-from socialai_dsl.semantics.terms import Line, Pattern
-from socialai_dsl.source import Positions
+from socialai_dsl.semantics.terms import Pattern
+from socialai_dsl.source import Node
 from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
 
 
@@ -47,7 +47,7 @@ def shared_space(
     names: Sequence[str],
     members: Sequence[CheckedScenario],
     actions: tuple[str, ...],
-    places: Positions,
+    places: Node,
     bag: DiagnosticBag,
 ) -> SharedSpace:
     """The action space of a suite; reports S401 for what a member needs and a written grammar cannot say.
@@ -88,7 +88,7 @@ def shared_space(
 
 
 def _check_looks(
-    names: Sequence[str], members: Sequence[CheckedScenario], places: Positions, bag: DiagnosticBag
+    names: Sequence[str], members: Sequence[CheckedScenario], places: Node, bag: DiagnosticBag
 ) -> None:
     """Report looks whose words differ from member to member: all members are seen in the same channels."""
     known: dict[str, tuple[str, tuple[str, ...]]] = {}
@@ -134,7 +134,7 @@ def _concatenated(
 
 
 def _check_sayable(
-    space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Positions, bag: DiagnosticBag
+    space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Node, bag: DiagnosticBag
 ) -> None:
     sayable = dict(_live(space, number, member))
     live = set(sayable.values())
@@ -170,10 +170,5 @@ def _scripted(member: CheckedScenario) -> Iterator[str]:
     """What the agent's own frame says."""
     for frame in member.frames:
         if frame.entity == 0:
-            yield from (text for line in _lines(frame) for text in texts_of(line))
-
-
-def _lines(frame: FramePlan) -> Iterator[Line]:
-    rules = (rule for state in frame.states for rule in (*state.first, *state.then))
-    said = (*(rule.say for rule in rules), *(step.say for step in frame.steps))
-    yield from (line for line in said if line is not None)
+            said = (one.say for one in frame.causing)
+            yield from (text for line in said if line is not None for text in texts_of(line))

@@ -22,7 +22,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from functools import reduce
+from operator import add, eq, le, lt, mul, ne, neg, sub
+from typing import Any, Final, Literal
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import Leaf
@@ -603,29 +605,24 @@ def arithmetic(op: Any, *args: Term) -> Term:
     return Operation(_range(op, *(arg.type for arg in args)), op, args)
 
 
+COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {"==": eq, "!=": ne, "<": lt, "<=": le}
+"""How numbers that are known compare."""
+
+_OF_ONE: Final[dict[str, Callable[[int], int]]] = {"abs": abs, "neg": neg}
+_OF_TWO: Final[dict[str, Callable[[int, int], int]]] = {
+    "+": add,
+    "-": sub,
+    "*": mul,
+    "//": lambda a, b: a // b if b else 0,
+    "%": lambda a, b: a % b if b else 0,
+    "min": min,
+    "max": max,
+}
+
+
 def compute(op: str, *values: int) -> int:
-    """The result of an operation on numbers that are known."""
-    a, b = values[0], values[-1]
-    match op:
-        case "+":
-            return a + b
-        case "-":
-            return a - b
-        case "*":
-            return a * b
-        case "//":
-            return a // b
-        case "%":
-            return a % b
-        case "min":
-            return min(values)
-        case "max":
-            return max(values)
-        case "abs":
-            return abs(a)
-        case "neg":
-            return -a
-    raise AssertionError(f"internal: unknown operation {op}")
+    """The result of an operation on numbers that are known; as in a room, dividing by nothing gives 0."""
+    return _OF_ONE[op](*values) if op in _OF_ONE else reduce(_OF_TWO[op], values)
 
 
 def _range(op: str, *types: Type) -> Type:

@@ -8,8 +8,7 @@ from typing import Any, Final
 
 import yaml
 
-from socialai_dsl.loader.reader import Document
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import Node
 
 _OF_A_MOMENT: Final = ("member", "t", "last", "heard", "pending")
 _Parser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
@@ -35,27 +34,23 @@ def suite_text(name: str, scenario: str, layout: Mapping[str, Any]) -> str:
     )
 
 
-def with_layout(document: Document, member: int, layout: Mapping[str, Any]) -> str:
+def with_layout(entry: Node, layout: Mapping[str, Any]) -> str:
     """The text of a suite's file with another layout of a member.
 
     Args:
-        document: the file.
-        member: its number in `members`.
+        entry: the member in the file's `members`.
         layout: as `start_layout` returns it.
     """
-    text = document.source.text
-    path: DataPath = ("members", member)
-    entry = document.part(path)
-    if not isinstance(entry, Mapping):
-        node = document.node(path)
-        written = _written(layout, _indent(text, node.start))
-        return f"{text[: node.start]}{{scenario: {text[node.start : node.end]}, layout: {written}}}{text[node.end :]}"
-    if "layout" in entry:
-        start = document.node((*path, "layout")).start
-        written = _written(layout, _indent(text, document.node(path).start))
-        return text[:start] + written + text[_end(text, start) :]
-    start, end = document.node(path).start, document.node((*path, "scenario")).end
-    if document.in_flow((*path, "scenario")):
+    text, start, end = entry.source.text, entry.span.start, entry.span.end
+    if not isinstance(entry.children, dict):
+        written = _written(layout, _indent(text, start))
+        return f"{text[:start]}{{scenario: {text[start:end]}, layout: {written}}}{text[end:]}"
+    if "layout" in entry.children:
+        former = entry.children["layout"].span.start
+        return text[:former] + _written(layout, _indent(text, start)) + text[_end(text, former) :]
+    named = entry.children["scenario"].span
+    end = named.end
+    if named.flow:
         return f"{text[:end]}, layout: {_written(layout, _indent(text, start))}{text[end:]}"
     column = start - text.rfind("\n", 0, start) - 1
     line_end = end + len(text[end:].partition("\n")[0])

@@ -193,13 +193,11 @@ class Session:
             return {"suite": suite_text(name, self._path.name, layout), "name": f"{name}.yaml"}
         if loaded.suite.members is None or loaded.suite.sweep is not None or loaded.in_sequence:
             raise RefusalError("members that are acts or made by a tree or sweep get their layouts by hand")
-        document = loaded.resolved.find(())[0]
-        member = loaded.member_names.index(described["member"])
-        try:
-            written = with_layout(document, member, layout)
-        except (KeyError, IndexError):  # another file says what the members are
-            raise RefusalError("the members are not written in this file") from None
-        return {"text": written}
+        suite = loaded.resolved.tree
+        entry = suite.at(("members", loaded.member_names.index(described["member"])))
+        if any(part.file != suite.file for _, part in entry.walk()):
+            raise RefusalError("the members are not written in this file")
+        return {"text": with_layout(entry, layout)}
 
     def replay(self) -> Reply:
         """The episode so far as a page of its own."""

@@ -12,11 +12,9 @@ import pytest
 
 from socialai_dsl.diagnostics import Diagnostic
 from socialai_dsl.loader import patches, reader, resolved
-from socialai_dsl.loader.library import Library, Node
-from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.patches import Miss
-from socialai_dsl.loader.reader import Plain
-from socialai_dsl.source import Source, Span
+from socialai_dsl.loader.reader import Library, Plain
+from socialai_dsl.source import Node, Source, Span, Style
 
 Patch = pytest.MonkeyPatch
 

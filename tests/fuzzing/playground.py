@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 
 ROOT = Path(__file__).parents[2]
 DIAGNOSTICS = ROOT / "tests" / "diagnostics"

@@ -15,9 +15,8 @@ from socialai_dsl.diagnostics import CODES, Diagnostic, ScenarioError, Severity,
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar.ast import MAX_LENGTH, ParseProblem, parse_expression, parse_text
 from socialai_dsl.loader import reader
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import FORBIDDEN, Document, decoded, read_document
-from socialai_dsl.source import Source
+from socialai_dsl.loader.reader import FORBIDDEN, decoded, read_document
+from socialai_dsl.source import Node, Source, Style
 from tests.fuzzing.playground import SECRET, Playground, listening
 
 SECONDS = 10
@@ -127,12 +126,12 @@ def _judge_place(one: Diagnostic, source: Source) -> None:
             raise Violation(f"{one} does not stand at the word, but at {here[:20]!r}")
 
 
-def _judge_positions(read: Document) -> None:
+def _judge_positions(read: Node) -> None:
     """Line and column of every part lead to the character at which it starts."""
     starts = [0]
     for found in re.finditer(r"\r\n|\n|\r", read.source.text):
         starts.append(found.end())
-    for path, node in read.spans.items():
+    for path, node in ((path, part.span) for path, part in read.walk()):
         if len(path) > reader.MAX_DEPTH:
             raise Violation(f"nested {len(path)} deep")
         if node.style in (Style.PLAIN, Style.SINGLE, Style.DOUBLE) and node.end > node.start:

@@ -7,7 +7,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.analysis.check import check_scenario
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 from tests.quick import one_in
 
 CLAIMING = {

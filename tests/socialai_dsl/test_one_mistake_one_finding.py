@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from socialai_dsl.frontend import check
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.source import Source
 from tests.quick import one_in

@@ -15,8 +15,7 @@ import yaml
 from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.diagnostics import ScenarioError, render_text
 from socialai_dsl.frontend import check
-from socialai_dsl.loader.library import shipped_folder
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import read_document, shipped_folder
 from tests.quick import one_in
 
 PIECES = [

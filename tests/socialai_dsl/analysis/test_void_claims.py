@@ -205,7 +205,7 @@ def test_a_void_scenario_is_found_without_any_claim(
     file.write_text(HEAD.replace("BUILT", built).replace("EARSHOT", earshot) + text)
     loaded = socialai_dsl.load(file)
     assert isinstance(loaded, LoadedScenario)
-    (plan,) = by_default(loaded, loaded.resolved.key_span(("outcome",)))
+    (plan,) = by_default(loaded, loaded.resolved.tree.key_span(("outcome",)))
     report = check_property(loaded, plan, Effort(ROOMS, 0, 20_000))
     assert report.verdict is Verdict.FAILS
     assert said in report.said

@@ -9,7 +9,7 @@ import yaml
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import Document, read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.socialai_dsl.authoring.documents import document
 
@@ -131,8 +131,8 @@ k:
 
 def meaning(text: str) -> tuple[object, ...]:
     """The data, spelt out so that true is not 1, how its parts are written, and the comments in order."""
-    read: Document = read_document(Source("a.yaml", text))
-    styles = {path: node.style for path, node in read.spans.items()}
+    read = read_document(Source("a.yaml", text))
+    styles = {path: node.span.style for path, node in read.walk()}
     return repr(read.data), styles, [comment.text for comment in comments_of(read)]
 
 

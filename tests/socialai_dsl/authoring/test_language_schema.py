@@ -54,7 +54,7 @@ def shape_of(data: Any, folder: Path) -> list[str]:
             case "library":
                 check_library(resolved, bag)
             case "suite":
-                model_of(Suite, resolved.data, resolved, bag, parameters=False)
+                model_of(Suite, resolved.tree, bag, parameters=False)
     except ScenarioError as error:
         bag.extend(error.diagnostics)
     return [str(d) for d in bag if d.severity is Severity.ERROR and d.code not in MEANING]

@@ -9,7 +9,6 @@ from socialai_dsl.checking.scenarios import MOST_MEMBERS as MOST
 from socialai_dsl.checking.scenarios import put_parameters, spread
 from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.frontend import check
-from socialai_dsl.loader.library import tree_of
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 
@@ -22,7 +21,7 @@ cast:
 
 
 def written_out(text):
-    tree, bag = tree_of(read_document(Source("party.yaml", text))), DiagnosticBag()
+    tree, bag = read_document(Source("party.yaml", text)), DiagnosticBag()
     spread(tree, bag)
     return tree, list(bag)
 
@@ -30,7 +29,7 @@ def written_out(text):
 def test_each_member_has_its_own_of_a_list_and_the_rest_in_common():
     made, found = written_out(TEXT)
     assert not found
-    assert made.data()["cast"] == {
+    assert made.data["cast"] == {
         "peers[0]": {"name": "Bob", "color": "distinct", "at": [1, 1], "kind": "guest"},
         "peers[1]": {"name": "Cy", "color": "distinct", "at": [2, 1], "kind": "guest"},
         "peers[2]": {"name": "Dee", "color": "distinct", "at": [3, 1], "kind": "guest"},
@@ -49,7 +48,7 @@ def test_what_is_wrong_with_one_of_them_is_shown_where_it_is_written():
 
 
 def test_parameters_are_followed_to_every_member():
-    tree = tree_of(read_document(Source("party.yaml", TEXT.replace("guest", "$kind"))))
+    tree = read_document(Source("party.yaml", TEXT.replace("guest", "$kind")))
     put_parameters(tree, {"kind": "guest"}, ["kind"], bag := DiagnosticBag())
     spread(tree, bag)
     kinds = [tree.at(("cast", f"peers[{i}]", "kind")) for i in range(3)]
@@ -60,7 +59,7 @@ def test_parameters_are_followed_to_every_member():
 def test_without_groups_nothing_changes():
     text = "scenario: alone\ncast: {agent: {}, bob: {name: Bob}}\n"
     made, found = written_out(text)
-    assert made.data() == yaml.safe_load(text)
+    assert made.data == yaml.safe_load(text)
     assert not found
 
 
@@ -68,7 +67,7 @@ def test_without_groups_nothing_changes():
 def test_what_is_no_cast_is_left_to_others(cast):
     made, found = written_out(f"scenario: alone\ncast: {cast}\n")
     assert not found
-    assert set(made.data()) == {"scenario", "cast"}
+    assert set(made.data) == {"scenario", "cast"}
 
 
 @pytest.mark.parametrize(
@@ -102,7 +101,7 @@ def test_mistakes_are_reported_once(member, code, message):
 def test_a_group_of_one_is_a_group():
     made, found = written_out("scenario: party\ncast: {peers: {count: 1, at: [1, 1], name: [Bob]}}\n")
     assert not found
-    assert made.data()["cast"] == {"peers[0]": {"at": [1, 1], "name": "Bob"}}
+    assert made.data["cast"] == {"peers[0]": {"at": [1, 1], "name": "Bob"}}
 
 
 PARTY = """\

@@ -81,6 +81,15 @@ def test_acts_share_the_longest_horizon() -> None:
     assert not suite("pair").in_sequence
 
 
+def test_a_value_changes_the_scenario_as_the_files_put_together_say() -> None:
+    Path("sizes.yaml").write_text(
+        "suite: sizes\ntree: {scenario: lesson, size: {small: {set: {room.size: 7}}}}\n"
+    )
+    Path("late.yaml").write_text("suite: late\nextends: sizes\ntree: {size: {small: {set: {horizon: 9}}}}\n")
+    (member,) = suite("late").members
+    assert (member.scenario.room.size, member.checked.horizon) == (7, 9)
+
+
 def test_variants_are_passed_on_to_leaves() -> None:
     assert [m.resolved.name for m in suite("school+unsocial").members[:1]] == ["lesson+unsocial"]
 

@@ -13,7 +13,7 @@ from safetensors import safe_open
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.evaluation.export import Moved
-from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import shipped_folder
 
 Capture = pytest.CaptureFixture[str]
 

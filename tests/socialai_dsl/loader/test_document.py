@@ -1,4 +1,4 @@
-"""PositionedData: of keys, of values, and of single characters inside every kind of scalar."""
+"""Places: of keys, of values, and of single characters inside every kind of scalar."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import Document, read_document
-from socialai_dsl.source import Source, Span
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.source import Node, Source, Span, Style
 
 
-def read(text: str) -> Document:
+def read(text: str) -> Node:
     return read_document(Source("f", text))
 
 
-def place(document: Document, key: str, word: str) -> tuple[int, int]:
+def place(document: Node, key: str, word: str) -> tuple[int, int]:
     """Line and column of a word in the text at a top-level key."""
     assert isinstance(document.data, dict)
     text = document.data[key]
@@ -35,9 +34,9 @@ def test_keys_and_values() -> None:
     assert document.value_span(("a", "c", 1)) == Span("f", 1, 19, 2)
     assert document.key_span(("a", "c", 1)) == Span("f", 1, 19, 2)
     assert document.value_span(("d", 0, "e")) == Span("f", 3, 8, 5)
-    assert document.node_span(("a", "b")).flow
-    assert not document.node_span(("d", 0, "e")).flow
-    assert document.node_span(("d",)).style is Style.SEQUENCE
+    assert document.at(("a", "b")).span.flow
+    assert not document.at(("d", 0, "e")).span.flow
+    assert document.at(("d",)).span.style is Style.SEQUENCE
 
 
 def test_what_does_not_exist_is_where_its_nearest_ancestor_is() -> None:
@@ -111,7 +110,7 @@ def test_every_visible_character_is_found_where_it_stands(
     except ScenarioError:
         assume(False)
     assert document.data == {"k": value}
-    quoted = document.node_span(("k",)).style is Style.DOUBLE
+    quoted = document.at(("k",)).span.style is Style.DOUBLE
     for offset, character in enumerate(value):
         span = document.locate(("k",), offset)
         there = document.source.line(span.line)[span.column - 1 :]

@@ -46,17 +46,17 @@ def with_one_of(folder: Path, written: str) -> str:
 
 def test_a_pattern_stands_for_the_files_that_somebody_can_be_in_order_of_their_names() -> None:
     found = drawn("play.yaml")
-    assert [file["npc"] for file in found.part(FILES_OF_GUIDE)] == ["g_1", "g_2"]
-    assert resolve("play.yaml").part(FILES_OF_GUIDE) == "npcs/g_*.yaml"
+    assert [file["npc"] for file in found.tree.at(FILES_OF_GUIDE).data] == ["g_1", "g_2"]
+    assert resolve("play.yaml").tree.at(FILES_OF_GUIDE).data == "npcs/g_*.yaml"
 
 
 def test_a_list_keeps_its_order(folder: Path) -> None:
     found = drawn(with_one_of(folder, "[npcs/g_2.yaml, npcs/g_1.yaml]"))
-    assert [file["npc"] for file in found.part(FILES_OF_GUIDE)] == ["g_2", "g_1"]
+    assert [file["npc"] for file in found.tree.at(FILES_OF_GUIDE).data] == ["g_2", "g_1"]
 
 
 def test_files_have_what_they_build_on() -> None:
-    _, two = drawn("play.yaml").part(FILES_OF_GUIDE)
+    _, two = drawn("play.yaml").tree.at(FILES_OF_GUIDE).data
     assert (two["kind"], two["view"], list(two["frames"])) == ("two", 3, ["lead"])
     assert "extends" not in two
     assert not two.get("abstract")
@@ -68,7 +68,7 @@ def test_each_part_knows_the_file_it_was_written_in() -> None:
         path: (Path(span.file).name, span.line)
         for path in [("cast", "guide", "name"), (*FILES_OF_GUIDE, 0, "color"), (*FILES_OF_GUIDE, 1, "view"),
                      (*FILES_OF_GUIDE, 1, "frames", "lead", "steps", 0, "do")]
-        for span in [found.value_span(path)]
+        for span in [found.tree.value_span(path)]
     }  # fmt: skip
     assert list(spans.values()) == [("play.yaml", 4), ("g_1.yaml", 3), ("g_base.yaml", 4), ("g.yaml", 5)]
 
@@ -85,8 +85,8 @@ def test_all_files_are_sources() -> None:
 
 
 def test_variants_come_first() -> None:
-    assert [file["npc"] for file in drawn("play+short").part(FILES_OF_GUIDE)] == ["g_2"]
-    assert drawn("play+red").part(("cast", "guide", "color")) == "red"
+    assert [file["npc"] for file in drawn("play+short").tree.at(FILES_OF_GUIDE).data] == ["g_2"]
+    assert drawn("play+red").tree.at(("cast", "guide", "color")).data == "red"
 
 
 def test_nothing_to_draw_leaves_everything_as_it_is(folder: Path) -> None:
@@ -99,7 +99,7 @@ def test_nothing_to_draw_leaves_everything_as_it_is(folder: Path) -> None:
 
 @pytest.mark.parametrize("written", ["3", "{a: 1}", "true"])
 def test_what_names_no_files_is_left_to_the_schema(folder: Path, written: str) -> None:
-    assert not isinstance(drawn(with_one_of(folder, written)).part(FILES_OF_GUIDE), list | str)
+    assert not isinstance(drawn(with_one_of(folder, written)).tree.at(FILES_OF_GUIDE).data, list | str)
 
 
 @pytest.mark.parametrize(

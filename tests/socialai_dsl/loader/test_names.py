@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.loader.library import ScenarioName, name_source, parse_name
+from socialai_dsl.loader.resolved import ScenarioName, name_source, parse_name
 
 
 def parse(text: str, folder: Path | None = None) -> tuple[ScenarioName, list[str]]:

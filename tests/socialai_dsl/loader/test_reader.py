@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader import reader
-from socialai_dsl.loader.reader import MAX_DEPTH, MAX_SCALAR, Data, Document
-from socialai_dsl.source import Source
+from socialai_dsl.loader.reader import MAX_DEPTH, MAX_SCALAR
+from socialai_dsl.source import Data, Node, Source
 
 PARSERS = [yaml.CSafeLoader, yaml.SafeLoader] if yaml.__with_libyaml__ else [yaml.SafeLoader]
 
@@ -30,7 +30,7 @@ def _each_parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 each_parser = pytest.mark.usefixtures("_each_parser")
 
 
-def read(text: str) -> Document:
+def read(text: str) -> Node:
     return reader.read_document(Source("f.yaml", text))
 
 
@@ -326,7 +326,7 @@ def test_dumped_data_is_read_again(data: Data, flow: bool) -> None:
     document = read(text)
     assert document.data == data
     for path, part in parts(data):
-        node = document.node_span(path)
+        node = document.at(path).span
         if isinstance(part, str):
             assert text[node.start] == text[node.end - 1] == '"'
         elif not isinstance(part, (dict, list)):

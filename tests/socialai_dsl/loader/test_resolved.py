@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import library, resolved
+from socialai_dsl.loader import reader, resolved
 from socialai_dsl.loader.members import check_splits, members_of
 from socialai_dsl.loader.reader import MAX_CHAIN, MAX_FILES
 from socialai_dsl.loader.resolved import resolve, shipped_names
@@ -55,7 +55,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
     for name, text in FILES.items():
         write_file(name, text)
-    for module in (library, resolved):
+    for module in (reader, resolved):
         monkeypatch.setattr(module, "shipped_folder", lambda: tmp_path / "shipped")
     monkeypatch.chdir(tmp_path / "user")
     return write_file
@@ -149,12 +149,12 @@ def test_what_is_no_file() -> None:
 
 def test_origins_point_into_the_file_that_wrote_it() -> None:
     found = resolve("market+swap+hidden")
-    assert str(found.origin(("cast", "anna", "name"))).endswith("market_swap.yaml:3:23")
-    assert str(found.key_span(("cast", "anna", "name"))).endswith("market_swap.yaml:3:7")
-    assert str(found.origin(("cast", "bob", "name"))).endswith("market.yaml:5:15")
-    assert str(found.locate(("observe", "npcs"), 3)).endswith("hidden.yaml:3:24")
-    assert str(found.key_span(("cast", "anna", "nothing"))).endswith("market.yaml:4:3")
-    assert found.document.part(("cast", "bob", "name")) == "Bob"
+    assert str(found.tree.value_span(("cast", "anna", "name"))).endswith("market_swap.yaml:3:23")
+    assert str(found.tree.key_span(("cast", "anna", "name"))).endswith("market_swap.yaml:3:7")
+    assert str(found.tree.value_span(("cast", "bob", "name"))).endswith("market.yaml:5:15")
+    assert str(found.tree.locate(("observe", "npcs"), 3)).endswith("hidden.yaml:3:24")
+    assert str(found.tree.key_span(("cast", "anna", "nothing"))).endswith("market.yaml:4:3")
+    assert found.tree.at(("cast", "bob", "name")).data == "Bob"
     assert {Path(name).name for name in found.files if name != "scenario name"} == {
         "market.yaml",
         "market_swap.yaml",
@@ -170,8 +170,8 @@ def test_extends_merges_mappings_and_replaces_lists() -> None:
         "skills": ["a", "b"],
         "horizon": 5,
     }
-    assert str(found.origin(("room", "occlusion"))).endswith("base.yaml:3:28")
-    assert str(found.origin(("room", "size"))).endswith("inner.yaml:4:14")
+    assert str(found.tree.value_span(("room", "occlusion"))).endswith("base.yaml:3:28")
+    assert str(found.tree.value_span(("room", "size"))).endswith("inner.yaml:4:14")
     assert data("deep/base")["abstract"] is True
 
 
@@ -284,14 +284,14 @@ def test_patches_from_another_file(write: Write) -> None:
         "suite: tree\nleaves:\n  - {set: {horizon: 42}, remove: [cast.bob]}\n  - {set: {horizn.x: 1}}\n",
     )
     tree, market = resolve("tree"), resolve("market")
-    changed = market.patched(tree, ("leaves", 0))
+    changed = market.patched(tree.tree.at(("leaves", 0)))
     assert isinstance(changed.data, dict)
     assert changed.data["horizon"] == 42
     assert list(changed.data["cast"]) == ["anna"]  # type: ignore[arg-type]
-    assert str(changed.origin(("horizon",))) == "tree.yaml:3:21"
+    assert str(changed.tree.value_span(("horizon",))) == "tree.yaml:3:21"
     assert market.data == data("market")
     with pytest.raises(ScenarioError, match=r"tree.yaml:4:12: S501 there is no `horizn`"):
-        market.patched(tree, ("leaves", 1))
+        market.patched(tree.tree.at(("leaves", 1)))
 
 
 KINDS = {
@@ -484,8 +484,8 @@ def test_shipped_names_leave_out_variants_of_any_scenario() -> None:
 
 def test_the_shipped_folder_is_beside_or_in_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    package = Path(library.__file__).parents[1]
-    assert library.shipped_folder() in (package / "scenarios", package.parent / "scenarios")
+    package = Path(reader.__file__).parents[1]
+    assert reader.shipped_folder() in (package / "scenarios", package.parent / "scenarios")
 
 
 def test_resolving_is_quick() -> None:
