@@ -209,7 +209,11 @@ import importlib, sys
 for name in {names!r}:
     for own in [own for own in sys.modules if own.split(".")[0] in ("socialai_dsl", "trainer")]:
         del sys.modules[own]
-    importlib.import_module(name)
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name.split(".")[0] in ("socialai_dsl", "trainer"):
+            raise  # others are libraries of an extra that is not installed
 """
     subprocess.run([sys.executable, "-c", script], check=True, cwd=ROOT, timeout=900)
 
