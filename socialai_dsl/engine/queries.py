@@ -23,7 +23,9 @@ from socialai_dsl.engine.turns import (
     go_by_itself,
     move_agent,
     notice,
+    perceive,
     settle,
+    state_table,
 )
 from socialai_dsl.program import Body, Flag, FrameColumn, Header, Register
 
@@ -43,7 +45,8 @@ def _play(row: Row, link: int) -> None:
     if program[Header.FLAGS] & Flag.AGENT_FRAME:
         frame = program[Header.FRAME_AT]
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard, program[Header.FLAGS])
+        perceive(row, frame, program[Header.FLAGS])
+        chosen = notice(row, program[state_table(row, frame) + 1 + heard])
         body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
         row.registers[Register.ACTION] = body
         move_agent(row, body)
@@ -52,7 +55,7 @@ def _play(row: Row, link: int) -> None:
             compute_statuses(row, go_by_itself(row) or changed)
         else:
             settle(row)
-        conclude(row, frame, heard, chosen, program[Header.FLAGS])
+        conclude(row, frame, state_table(row, frame), heard, chosen, program[Header.FLAGS])
         line = row.registers[Register.SAID_LINE]
     action = row.action
     action[1] = 0

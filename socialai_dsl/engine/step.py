@@ -18,8 +18,10 @@ from socialai_dsl.engine.turns import (
     go_by_itself,
     move_agent,
     notice,
+    perceive,
     say_as_agent,
     settle,
+    state_table,
     take_turns,
 )
 from socialai_dsl.engine.vm import run
@@ -104,7 +106,9 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     chosen = False
     if flags & Flag.AGENT_FRAME:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard, flags)  # the caller decides what the agent does
+        perceive(row, frame, flags)
+        # Whatever it has chosen, the caller decides what the agent does.
+        chosen = notice(row, program[state_table(row, frame) + 1 + heard])
     move_agent(row, registers[Register.ACTION])
     if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)
@@ -117,7 +121,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         settle(row)
     say_as_agent(row)
     if flags & Flag.AGENT_FRAME:
-        conclude(row, frame, heard, chosen, flags)
+        conclude(row, frame, state_table(row, frame), heard, chosen, flags)
         empty_inbox(row, program[frame + FrameColumn.INBOX])
         registers[Register.SAID_LINE] = 0
 
