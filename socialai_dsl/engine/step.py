@@ -3,14 +3,16 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.calls import TERMINATED, TRUNCATED
 from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.picture import take_picture
+from socialai_dsl.engine.pointers import int64_of
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
-from socialai_dsl.engine.state import AGENT, NOTHING, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
@@ -52,19 +54,19 @@ def be_silent(row: Row) -> None:
 
 
 @inline
-def _filling(row: Row, link: int) -> int:
+def _filling(row: Row, link: int, action: NDArray[np.int64]) -> int:
     """The number of the words in all slots of what the agent says; -1 if the program lacks one of them."""
     program = row.program
     slots = program[link + Link.SLOTS]
     sizes = program[link + Link.SIZE_AT]
     words = program[link + Link.WORD_AT]
-    strides = program[link + Link.STRIDE_AT] + row.action[2] * (1 + slots)
+    strides = program[link + Link.STRIDE_AT] + action[2] * (1 + slots)
     filling = program[strides]
     lacks = False
     for slot in range(slots):
         stride = program[strides + 1 + slot]
         if stride != 0:
-            word = program[words + row.action[3 + slot]]
+            word = program[words + action[3 + slot]]
             lacks |= word < 0
             filling += stride * word
         words += program[sizes + slot]
@@ -72,15 +74,15 @@ def _filling(row: Row, link: int) -> int:
 
 
 @inline
-def decode(row: Row, link: int) -> None:
+def decode(row: Row, link: int, action: NDArray[np.int64]) -> None:
     """Note the agent's body action and utterance. What its grammar cannot say is silence."""
     registers = row.registers
     program = row.program
-    registers[Register.ACTION] = program[link + Link.END + row.action[0]]
+    registers[Register.ACTION] = program[link + Link.END + action[0]]
     be_silent(row)
-    if row.action[1] == 1:
-        template = program[program[link + Link.TEMPLATE_AT] + row.action[2]]
-        filling = _filling(row, link)
+    if action[1] == 1:
+        template = program[program[link + Link.TEMPLATE_AT] + action[2]]
+        filling = _filling(row, link, action)
         if template >= 0 and filling >= 0:
             pair = template * program[Header.NOUNS] + filling
             registers[Register.TEMPLATE] = template
@@ -99,7 +101,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     program = row.program
     flags = program[Header.FLAGS]
     begin(row)
-    decode(row, link)
+    decode(row, link, int64_of(book, Book.ACTIONS, number))
 
     frame = program[Header.FRAME_AT]
     heard = 0
