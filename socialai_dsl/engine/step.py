@@ -26,7 +26,7 @@ from socialai_dsl.engine.turns import (
     state_table,
     take_turns,
 )
-from socialai_dsl.engine.vm import run
+from socialai_dsl.engine.vm import past_tests, run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
 
@@ -154,6 +154,8 @@ def _judge(row: Row, link: int) -> float:
     else:
         table = program[Header.OUTCOME_AT] + 8 * registers[Register.CLASS]
         pc = program[table + registers[Register.ACTION]]
+        if pc != 0:
+            pc = past_tests(row, pc)
         if pc != 0:
             run(row, pc)
     if registers[Register.OUTCOME] >= 0:
