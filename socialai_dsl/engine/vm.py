@@ -218,7 +218,7 @@ def past_tests(row: Row, pc: int) -> int:
         if op <= Op.IF_LE:
             does_hold = compares(op, left, right)
         else:
-            does_hold = is_away(row, left, right, op - Op.IF_SAME_CELL)
+            does_hold = is_away(row, left, right, np.int64(op == Op.IF_NEXT_TO))
         if not does_hold:
             code += 4 * row.program[code + 3]
         code += 4
