@@ -118,8 +118,7 @@ class Batch:
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         self._pool_starts = starts.tolist()
         self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
-        tables = self.tables._replace(views=self.tables.views.reshape(-1))
-        self._book = make_book((*tables, *self.state, *self.ports, self.ports.actions.reshape(-1)))
+        self._book = make_book((*self.tables, *self.state, *self.ports, self.ports.actions.reshape(-1)))
 
     def program_numbers(self) -> NDArray[np.intp]:
         """Which program each row plays, (E,)."""

@@ -10,7 +10,7 @@ from socialai_dsl.engine.paths import find_way
 from socialai_dsl.engine.sight import is_unobstructed
 from socialai_dsl.engine.speech import is_in_inbox
 from socialai_dsl.engine.state import NO_CELL, NO_PATH, PIN_NONE, Row
-from socialai_dsl.engine.whereabouts import facing, is_somewhere, x_of, y_of
+from socialai_dsl.engine.whereabouts import distance, facing, is_somewhere, x_of, y_of
 from socialai_dsl.program import EntityColumn, Op
 
 
@@ -40,6 +40,12 @@ def compares(op: int, left: int, right: int) -> bool:
     if op == Op.IF_LE:
         return left <= right
     return 0 <= right < 63 and (left >> right) & 1 == 1
+
+
+@inline
+def is_away(row: Row, a: int, b: int, cells: int) -> bool:
+    """Whether two entities or cells are in the room, and so far from each other."""
+    return is_somewhere(row, a) and is_somewhere(row, b) and distance(row, a, b) == cells
 
 
 @inline

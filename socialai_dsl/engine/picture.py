@@ -10,7 +10,7 @@ from socialai_dsl.engine.boards import object_look
 from socialai_dsl.engine.carrying import carried_by
 from socialai_dsl.engine.entities import field, is_present, npc_at, quadrant, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.pointers import bytes_of, uint16_of
+from socialai_dsl.engine.pointers import bytes_of, uint16_of, uint32_of
 from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
@@ -50,37 +50,39 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 def take_picture(row: Row, link: int, book: Any, number: int) -> None:
     """Write what the agent, in row `number` of the book, sees; its own cell shows what it carries, or reads empty."""
     flags = row.program[Header.FLAGS]
+    image = uint32_of(book, Book.IMAGE, number)
     x = field(row, AGENT, Field.X)
     y = field(row, AGENT, Field.Y)
     if x < 0:
         for i in range(CELLS):
-            row.image[i] = row.program[Header.OUTSIDE]
-        row.image[OWN_PLACE] = OWN_LOOK
+            image[i] = row.program[Header.OUTSIDE]
+        image[OWN_PLACE] = OWN_LOOK
     else:
         lit = _EVERYWHERE
         if flags & Flag.OCCLUSION:
             lit = lit_cells(row, x, y, field(row, AGENT, Field.DIR))
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
-        _gather(row, (row.program[link + Link.VIEWS] + pose) * CELLS, lit)
+        view = uint16_of(book, Book.VIEWS, row.program[link + Link.VIEWS] + pose)
+        _gather(row, view, lit, image)
     if flags & Flag.CARRYING:
         carried = carried_by(row, AGENT)
         if carried != 0:
-            row.image[OWN_PLACE] = object_look(row, carried)
+            image[OWN_PLACE] = object_look(row, carried)
     if flags & Trait.MORE:
-        _show_more(row, link, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
+        _show_more(row, link, image, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
     elif flags & (Flag.EGOCENTRIC | Trait.GESTURES):
-        _show_npcs(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
+        _show_npcs(row, image, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
 
 @inline
-def _gather(row: Row, view: int, lit: np.uint64) -> None:
-    """Write the cells of the board that the table of views names; what is not lit reads 0, which is unseen."""
+def _gather(row: Row, view: NDArray[np.uint16], lit: np.uint64, image: NDArray[np.uint32]) -> None:
+    """Write the cells of the board that a row of the table of views names; what is not lit reads 0, which is unseen."""
     for i in range(CELLS):
-        row.image[i] = row.board[row.views[view + i]]
+        image[i] = row.board[view[i]]
     if lit != _EVERYWHERE:
         for i in range(CELLS):
-            row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
-    row.image[OWN_PLACE] = OWN_LOOK
+            image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
+    image[OWN_PLACE] = OWN_LOOK
 
 
 @inline
@@ -98,7 +100,9 @@ def _place_in_view(row: Row, npc: int) -> int:
 
 
 @outline
-def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16]) -> None:
+def _show_npcs(
+    row: Row, image: NDArray[np.uint32], extra: NDArray[np.uint16], picture: NDArray[np.uint16]
+) -> None:
     """Show which way NPCs look relative to the agent, where they point and what they did last, as far as shown.
 
     Then all channels are in `picture`. Whether the picture shows an NPC, which may be in the dark, hidden, or behind
@@ -109,18 +113,18 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
     if flags & Trait.GESTURES:
         for i in range(CELLS):
             extra[i] = NO_GESTURE << 8 | NO_GESTURE
-        _put_together(row, picture)
+        _put_together(image, picture)
     own = field(row, AGENT, Field.DIR)
     for npc in range(1, row.program[Header.NPCS] + 1):
         place = _place_in_view(row, npc)
         if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
             continue
-        look = row.image[place]
+        look = image[place]
         shown = -np.int64(look & 0xFF == NPC)
         if flags & Flag.EGOCENTRIC:
             turned = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
             look ^= (look ^ turned) & shown
-            row.image[place] = look
+            image[place] = look
         if flags & Trait.GESTURES:
             gesture = np.int64(NO_GESTURE << 8 | NO_GESTURE)
             if row.program[Header.CHANNELS] == _WITH_GESTURES:
@@ -132,7 +136,9 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
 
 
 @outline
-def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) -> None:
+def _show_more(
+    row: Row, link: int, image: NDArray[np.uint32], extra: NDArray[np.uint8], picture: NDArray[np.uint8]
+) -> None:
     """As `_show_npcs`, where pictures of the batch also show which cells NPCs point at, what they carry, or looks."""
     stay_outline()
     flags = row.program[Header.FLAGS]
@@ -140,17 +146,17 @@ def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[n
     more = row.program[link + Link.MORE]
     for i in range(more * CELLS):
         extra[i] = NO_GESTURE
-    _show_looks_of_objects(row, link, extra)
+    _show_looks_of_objects(row, link, image, extra)
     own = field(row, AGENT, Field.DIR)
     for npc in range(1, row.program[Header.NPCS] + 1):
         place = _place_in_view(row, npc)
         if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
             continue
-        look = row.image[place]
+        look = image[place]
         if look & 0xFF != NPC:
             continue
         if flags & Flag.EGOCENTRIC:
-            row.image[place] = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
+            image[place] = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
         shows = np.int64(flags & Flag.SHOWS_CARRYING != 0)
         if row.program[Header.CHANNELS] - shows >= _WITH_GESTURES:
             gesture = _gesture(row, npc, own)
@@ -167,19 +173,19 @@ def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[n
         _show_looks(row, link, extra, place, npc)
     # The commonest numbers, written out: loops with constant bounds are unrolled.
     if more == 1:
-        _join(row, extra, picture, 1)
+        _join(image, extra, picture, 1)
     elif more == 2:
-        _join(row, extra, picture, 2)
+        _join(image, extra, picture, 2)
     else:
-        _join(row, extra, picture, more)
+        _join(image, extra, picture, more)
 
 
 @inline
-def _join(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8], more: int) -> None:
+def _join(image: NDArray[np.uint32], extra: NDArray[np.uint8], picture: NDArray[np.uint8], more: int) -> None:
     """Write the channels of `image` and `extra` side by side."""
     for i in range(CELLS):
         place = (4 + more) * i
-        look = row.image[i]  # read once: the compiler does not know that `picture` is no part of it
+        look = image[i]  # read once: the compiler does not know that `picture` is no part of it
         for k in range(4):
             picture[place + k] = look >> 8 * k & 0xFF
         for k in range(more):
@@ -187,7 +193,7 @@ def _join(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8], more: 
 
 
 @inline
-def _show_looks_of_objects(row: Row, link: int, extra: NDArray[np.uint8]) -> None:
+def _show_looks_of_objects(row: Row, link: int, image: NDArray[np.uint32], extra: NDArray[np.uint8]) -> None:
     """Show the looks of objects that the picture shows: of several in a cell the last, which lies on top."""
     if row.program[link + Link.LOOKS] == 0 or field(row, AGENT, Field.X) < 0:
         return
@@ -196,14 +202,19 @@ def _show_looks_of_objects(row: Row, link: int, extra: NDArray[np.uint8]) -> Non
         place = _place_in_view(row, entity)
         if entity == carried:
             _show_looks(row, link, extra, OWN_PLACE, entity)
-        elif place >= 0 and place != OWN_PLACE and is_present(row, entity) and _shows(row, place, entity):
+        elif (
+            place >= 0
+            and place != OWN_PLACE
+            and is_present(row, entity)
+            and _shows(row, image, place, entity)
+        ):
             _show_looks(row, link, extra, place, entity)
 
 
 @inline
-def _shows(row: Row, place: int, entity: int) -> bool:
+def _shows(row: Row, image: NDArray[np.uint32], place: int, entity: int) -> bool:
     """Whether the picture shows the type of an object; an NPC may stand before it, or it may lie in the dark."""
-    return (row.image[place] ^ object_look(row, entity)) & 0xFF == 0
+    return (image[place] ^ object_look(row, entity)) & 0xFF == 0
 
 
 @inline
@@ -218,11 +229,11 @@ def _show_looks(row: Row, link: int, extra: NDArray[np.uint8], place: int, entit
 
 
 @inline
-def _put_together(row: Row, picture: NDArray[np.uint16]) -> None:
+def _put_together(image: NDArray[np.uint32], picture: NDArray[np.uint16]) -> None:
     """Write the six channels of a picture in which nobody points or did anything."""
     for i in range(CELLS):
-        picture[3 * i] = row.image[i]
-        picture[3 * i + 1] = row.image[i] >> 16
+        picture[3 * i] = image[i]
+        picture[3 * i + 1] = image[i] >> 16
         picture[3 * i + 2] = NO_GESTURE << 8 | NO_GESTURE
 
 

@@ -23,13 +23,15 @@ from socialai_dsl.engine.turns import (
     go_by_itself,
     move_agent,
     notice,
+    perceive,
     settle,
+    state_table,
 )
 from socialai_dsl.program import Body, Flag, FrameColumn, Header, Register
 
 
 @inline
-def _play(row: Row, link: int) -> None:
+def _play(row: Row, link: int, action: NDArray[np.int64]) -> None:
     """Write the action of the agent's frame, int64 (3 + slots,); the row is played on and must be a copy.
 
     Without a frame the agent stands still and is silent.
@@ -43,7 +45,8 @@ def _play(row: Row, link: int) -> None:
     if program[Header.FLAGS] & Flag.AGENT_FRAME:
         frame = program[Header.FRAME_AT]
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard, program[Header.FLAGS])
+        perceive(row, frame, program[Header.FLAGS])
+        chosen = notice(row, program[state_table(row, frame) + 1 + heard])
         body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
         row.registers[Register.ACTION] = body
         move_agent(row, body)
@@ -52,35 +55,33 @@ def _play(row: Row, link: int) -> None:
             compute_statuses(row, go_by_itself(row) or changed)
         else:
             settle(row)
-        conclude(row, frame, heard, chosen, program[Header.FLAGS])
+        conclude(row, frame, state_table(row, frame), heard, chosen, program[Header.FLAGS])
         line = row.registers[Register.SAID_LINE]
-    action = row.action
     action[1] = 0
     action[2] = 0
     for slot in range(program[link + Link.SLOTS]):
         action[3 + slot] = 0
     action[0] = _index_of(program, link + Link.END, program[link + Link.ACTIONS], body)
-    _encode_line(row, link, line)
+    _encode_line(row, link, line, action)
 
 
 @outline
-def _encode_line(row: Row, link: int, line: int) -> None:
+def _encode_line(row: Row, link: int, line: int, action: NDArray[np.int64]) -> None:
     stay_outline()
     program = row.program
-    action = row.action
     pair = line - program[Header.AGENT_SAYS]
     nouns = program[Header.NOUNS]
     if line == 0 or program[Header.AGENT_SAYS] == 0 or not 0 <= pair < program[Header.TEMPLATES] * nouns:
         return
     table = program[link + Link.TEMPLATE_AT]
     template = _index_of(program, table, program[link + Link.TEMPLATES], pair // nouns)
-    if template >= 0 and _encode_words(row, link, template, pair % nouns):
+    if template >= 0 and _encode_words(row, link, template, pair % nouns, action):
         action[1] = 1
         action[2] = template
 
 
 @outline
-def _encode_words(row: Row, link: int, template: int, filling: int) -> bool:
+def _encode_words(row: Row, link: int, template: int, filling: int, action: NDArray[np.int64]) -> bool:
     """Write the words in the slots of a template; whether the batch has them all."""
     stay_outline()
     program = row.program
@@ -97,7 +98,7 @@ def _encode_words(row: Row, link: int, template: int, filling: int) -> bool:
             word = _index_of(program, words, size, filling // stride)
             sayable &= word >= 0
             filling %= stride
-            row.action[3 + slot] = max(word, ZERO)
+            action[3 + slot] = max(word, ZERO)
         words += size
     return sayable
 
@@ -124,7 +125,7 @@ def _script_row(book: Any, row: int) -> None:
     copy(registers, opened.registers, sizes[Size.REGISTERS])
     copy(board, opened.board, sizes[Size.BOARD])
     copy(counters, opened.counters, count)
-    _play(opened, opened.program[Header.SIZE])
+    _play(opened, opened.program[Header.SIZE], int64_of(book, Book.ACTIONS, row))
     copy(opened.registers, registers, sizes[Size.REGISTERS])
     copy(opened.board, board, sizes[Size.BOARD])
     copy(opened.counters, counters, count)

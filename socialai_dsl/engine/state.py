@@ -216,13 +216,10 @@ class Row(NamedTuple):
     board: NDArray[np.uint32]
     key: NDArray[np.uint64]
     tokens: NDArray[np.int16]
-    image: NDArray[np.uint32]
-    action: NDArray[np.int64]
     counters: NDArray[np.int64]  # from the program's first on
     pins: NDArray[np.int16]
     scratch: NDArray[np.int64]
     sets: NDArray[np.uint32]  # line y of board b is number b * MAX_SIDE + y
-    views: NDArray[np.uint16]
 
 
 def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, more: int) -> State:

@@ -3,14 +3,16 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.calls import TERMINATED, TRUNCATED
 from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.picture import take_picture
+from socialai_dsl.engine.pointers import int64_of
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
-from socialai_dsl.engine.state import AGENT, NOTHING, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
@@ -18,11 +20,13 @@ from socialai_dsl.engine.turns import (
     go_by_itself,
     move_agent,
     notice,
+    perceive,
     say_as_agent,
     settle,
+    state_table,
     take_turns,
 )
-from socialai_dsl.engine.vm import run
+from socialai_dsl.engine.vm import past_tests, run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
 
@@ -50,19 +54,19 @@ def be_silent(row: Row) -> None:
 
 
 @inline
-def _filling(row: Row, link: int) -> int:
+def _filling(row: Row, link: int, action: NDArray[np.int64]) -> int:
     """The number of the words in all slots of what the agent says; -1 if the program lacks one of them."""
     program = row.program
     slots = program[link + Link.SLOTS]
     sizes = program[link + Link.SIZE_AT]
     words = program[link + Link.WORD_AT]
-    strides = program[link + Link.STRIDE_AT] + row.action[2] * (1 + slots)
+    strides = program[link + Link.STRIDE_AT] + action[2] * (1 + slots)
     filling = program[strides]
     lacks = False
     for slot in range(slots):
         stride = program[strides + 1 + slot]
         if stride != 0:
-            word = program[words + row.action[3 + slot]]
+            word = program[words + action[3 + slot]]
             lacks |= word < 0
             filling += stride * word
         words += program[sizes + slot]
@@ -70,15 +74,15 @@ def _filling(row: Row, link: int) -> int:
 
 
 @inline
-def decode(row: Row, link: int) -> None:
+def decode(row: Row, link: int, action: NDArray[np.int64]) -> None:
     """Note the agent's body action and utterance. What its grammar cannot say is silence."""
     registers = row.registers
     program = row.program
-    registers[Register.ACTION] = program[link + Link.END + row.action[0]]
+    registers[Register.ACTION] = program[link + Link.END + action[0]]
     be_silent(row)
-    if row.action[1] == 1:
-        template = program[program[link + Link.TEMPLATE_AT] + row.action[2]]
-        filling = _filling(row, link)
+    if action[1] == 1:
+        template = program[program[link + Link.TEMPLATE_AT] + action[2]]
+        filling = _filling(row, link, action)
         if template >= 0 and filling >= 0:
             pair = template * program[Header.NOUNS] + filling
             registers[Register.TEMPLATE] = template
@@ -97,14 +101,16 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     program = row.program
     flags = program[Header.FLAGS]
     begin(row)
-    decode(row, link)
+    decode(row, link, int64_of(book, Book.ACTIONS, number))
 
     frame = program[Header.FRAME_AT]
     heard = 0
     chosen = False
     if flags & Flag.AGENT_FRAME:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard, flags)  # the caller decides what the agent does
+        perceive(row, frame, flags)
+        # Whatever it has chosen, the caller decides what the agent does.
+        chosen = notice(row, program[state_table(row, frame) + 1 + heard])
     move_agent(row, registers[Register.ACTION])
     if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)
@@ -117,7 +123,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         settle(row)
     say_as_agent(row)
     if flags & Flag.AGENT_FRAME:
-        conclude(row, frame, heard, chosen, flags)
+        conclude(row, frame, state_table(row, frame), heard, chosen, flags)
         empty_inbox(row, program[frame + FrameColumn.INBOX])
         registers[Register.SAID_LINE] = 0
 
@@ -148,6 +154,8 @@ def _judge(row: Row, link: int) -> float:
     else:
         table = program[Header.OUTCOME_AT] + 8 * registers[Register.CLASS]
         pc = program[table + registers[Register.ACTION]]
+        if pc != 0:
+            pc = past_tests(row, pc)
         if pc != 0:
             run(row, pc)
     if registers[Register.OUTCOME] >= 0:

@@ -157,17 +157,11 @@ def move_npc(row: Row, npc: int, action: int) -> None:
 
 
 @inline
-def _state_table(row: Row, frame: int) -> int:
+def state_table(row: Row, frame: int) -> int:
     """Offset of the row of the frame's current state in the state table."""
     columns = 1 + 2 * (row.program[Header.CLASSES] + 1)
     state = row.program[frame + FrameColumn.ROWS] + row.registers[row.program[frame + FrameColumn.STATE]]
     return row.program[Header.STATE_AT] + columns * state
-
-
-@merged
-def _perceive(row: Row, frame: int) -> None:
-    if row.program[frame + FrameColumn.PERCEIVE] != 0:
-        run(row, row.program[frame + FrameColumn.PERCEIVE])
 
 
 @merged
@@ -177,12 +171,16 @@ def _do_the_rest(row: Row, frame: int) -> None:
 
 
 @merged
-def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
-    """The beliefs and `first` of a frame, before the body action; whether `first` has chosen that action."""
-    if flags & Trait.APART:
-        _perceive(row, frame)
+def perceive(row: Row, frame: int, flags: int) -> None:
+    """The beliefs of a frame, before anything else in its turn."""
+    if flags & Trait.APART and row.program[frame + FrameColumn.PERCEIVE] != 0:
+        run(row, row.program[frame + FrameColumn.PERCEIVE])
+
+
+@merged
+def notice(row: Row, pc: int) -> bool:
+    """Run the code of `first`, if there is any, before the body action; whether it has chosen that action."""
     row.registers[Register.LAST_TURN] = -1
-    pc = row.program[_state_table(row, frame) + 1 + heard]
     if pc != 0:
         pc = past_tests(row, pc)
     if pc != 0:
@@ -193,7 +191,7 @@ def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
 @merged
 def act(row: Row, frame: int) -> int:
     """The body action that the activity of the current state chooses."""
-    pc = row.program[_state_table(row, frame)]
+    pc = row.program[state_table(row, frame)]
     if pc != 0:
         code = row.program[Header.CODE_AT] + 4 * pc
         if row.program[code + 4] == Op.HALT:
@@ -211,11 +209,14 @@ def act(row: Row, frame: int) -> int:
 
 
 @merged
-def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None:
-    """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted."""
+def conclude(row: Row, frame: int, table: int, heard: int, chosen: bool, flags: int) -> None:
+    """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted.
+
+    `table` is what `state_table` gives now.
+    """
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
     if not chosen:
-        pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
+        pc = row.program[table + 2 + row.program[Header.CLASSES] + heard]
         if pc != 0:
             pc = past_tests(row, pc)
         if pc != 0:
@@ -233,17 +234,22 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
 def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
     """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves."""
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
-    chosen = notice(row, frame, heard, flags)
-    if not is_present(row, npc):
-        return
-    action = row.registers[Register.LAST_TURN]
-    if not chosen:
-        action = act(row, frame)
-    if action != Body.NONE:
-        move_npc(row, npc, action)
-        set_field(row, npc, Field.LAST, action)
+    perceive(row, frame, flags)
+    table = state_table(row, frame)
+    pc = row.program[table + 1 + heard]
+    chosen = notice(row, pc)
+    if pc != 0 or row.program[table] != 0 or flags & Trait.APART:
+        if not is_present(row, npc):
+            return
+        action = row.registers[Register.LAST_TURN]
+        if not chosen:
+            action = act(row, frame)
+        if action != Body.NONE:
+            move_npc(row, npc, action)
+            set_field(row, npc, Field.LAST, action)
+        table = state_table(row, frame)
     settle(row)
-    conclude(row, frame, heard, chosen, flags)
+    conclude(row, frame, table, heard, chosen, flags)
 
 
 @merged

@@ -5,7 +5,7 @@ import numpy as np
 from socialai_dsl.engine import paths
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import draw_entity
-from socialai_dsl.engine.conditions import compares, holds
+from socialai_dsl.engine.conditions import compares, holds, is_away
 from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import assign, draw_action, draw_below, draw_other, value
@@ -208,14 +208,18 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
 
 @inline
 def past_tests(row: Row, pc: int) -> int:
-    """Fast path: evaluates the comparisons that code begins with outside of the interpreter; 0 if it has ended."""
+    """Fast path: evaluates the commonest tests that code begins with outside of the interpreter; 0 if it has ended."""
     start = row.program[Header.CODE_AT]
     code = start + 4 * pc
     op = row.program[code]
-    while op >= Op.IF_EQ and op <= Op.IF_LE:
+    while (op >= Op.IF_EQ and op <= Op.IF_LE) or op == Op.IF_SAME_CELL or op == Op.IF_NEXT_TO:
         left = value(row, row.program[code + 1])
         right = value(row, row.program[code + 2])
-        if not compares(op, left, right):
+        if op <= Op.IF_LE:
+            does_hold = compares(op, left, right)
+        else:
+            does_hold = is_away(row, left, right, np.int64(op == Op.IF_NEXT_TO))
+        if not does_hold:
             code += 4 * row.program[code + 3]
         code += 4
         op = row.program[code]
