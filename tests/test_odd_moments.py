@@ -548,6 +548,16 @@ def test_entries_after_nested_ones_that_are_left_out_are_asked_as_themselves(
     )
 
 
+@pytest.mark.parametrize("never", ["repeat: 0, steps: [{do: left}]", "steps: [{do: left, for: 0}]"])
+def test_steps_of_no_rounds_are_over_at_once(tmp_path: Path, never: str) -> None:
+    text = f"""
+    frames: {{walk: {{steps: [{{{never}}}]}}}}
+    cast: {{ann: {{at: [5, 5], facing: up, frame: walk}}}}
+    """
+    state = play(tmp_path, text, [STILL] * 2)
+    assert (state["ann"]["facing"], state["ann"]["state"]) == ("up", "finished")
+
+
 @pytest.mark.parametrize(
     "frame",
     [

@@ -405,7 +405,7 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     steps = tuple(planner.step(path, step) for path, step in frame.entries())
     start = (frame.start or next(iter(frame.states), "")) if frame.states else ""
     nested = (
-        NestedPlanner(resolver, played, planner.condition, steps).plan() if frame.has_nested_steps else ()
+        NestedPlanner(resolver, played, planner.condition, steps).plan() if frame.has_nested_steps else None
     )
     return FramePlan(played.member, played.name, played.number, span, start, states, steps, nesting=nested)
 

@@ -237,8 +237,8 @@ class FramePlan:
     steps: tuple[StepPlan, ...] = ()
     written: bool = True
     """False: nobody wrote it; it is there for who only believes something."""
-    nesting: tuple[int | NestedSteps, ...] = ()
-    """Where some entries of `steps` are nested: their numbers in order, without those of `for: 0`."""
+    nesting: tuple[int | NestedSteps, ...] | None = None
+    """Where some entries of `steps` are nested: their numbers in order, without those that never begin."""
 
     @property
     def rules(self) -> tuple[RulePlan, ...]:
@@ -259,12 +259,14 @@ class FramePlan:
     @property
     def order(self) -> tuple[int | NestedSteps, ...]:
         """The numbers of the entries of `steps` that are not left out for good, nested as they are written."""
-        return self.nesting or tuple(k for k, step in enumerate(self.steps) if step.duration != 0)
+        if self.nesting is not None:
+            return self.nesting
+        return tuple(k for k, step in enumerate(self.steps) if step.duration != 0)
 
     @property
     def in_a_row(self) -> bool:
         """Whether every entry of `steps` follows the one before it."""
-        return not self.nesting and all(step.when is None for step in self.steps)
+        return self.nesting is None and all(step.when is None for step in self.steps)
 
 
 @dataclass(frozen=True, slots=True)
