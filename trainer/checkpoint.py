@@ -66,7 +66,8 @@ class CheckpointMeta(BaseModel):
 class Checkpoint:
     """A checkpoint in memory: metadata, and tensors by dotted name.
 
-    Names: `net.*`, `adam.*`, `rng`, `state.*`, `envs`, and where there is one `curriculum`, `guide`, `bonus.*`.
+    Names: `net.*`, `adam.*`, `state.*`, `step_scale`, `rng`, `envs`, and where there is one `curriculum`, `guide`,
+    `bonus.*`.
     """
 
     meta: CheckpointMeta

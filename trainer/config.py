@@ -105,7 +105,11 @@ class RunConfig(BaseModel):
         None, "weight of the entropy at the end, reached linearly; null: unchanged", ge=0
     )
     max_grad_norm: float = _option(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
-    target_kl: float | None = _option(None, "divergence that ends an update; null: none does", gt=0)
+    target_kl: float | None = _option(
+        None,
+        "divergence beyond which a gradient step is taken back and the next are shorter; null: none",
+        gt=0,
+    )
     normalize_advantages: bool = _option(True, "scale advantages to mean 0, deviation 1 (paper: no)")
     loss: Literal["joint", "per_head"] = _option(
         "joint",
@@ -268,7 +272,7 @@ RECIPES: Final[Mapping[str, Preset]] = {
             # Imitation ends with tiny gradients. Remembered for longer, they would make the first steps of PPO, whose
             # gradients are large, up to six times too long.
             "adam_beta2": 0.95,
-            # Imitation leaves little to learn; without a limit PPO unlearns it in its first updates.
+            # Imitation leaves a policy that is nearly certain; without a limit PPO unlearns it in a few steps.
             "target_kl": 0.02,
         },
         "docs/mastery.md: behaviour cloning of the scenario's script (Pomerleau 1991), then PPO",

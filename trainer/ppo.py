@@ -101,6 +101,9 @@ class LossParts(NamedTuple):
 STATISTICS = (*LossParts._fields, "grad_norm")
 """What is known of a gradient step; the last is the gradient's norm before clipping."""
 
+SHORTER, LONGER = 0.5, 1.25
+"""What the learning rate is multiplied by after an update that left the trust region, and after one that did not."""
+
 
 def ppo_loss(
     batch: Batch,
@@ -173,9 +176,13 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
 
     A minibatch's shares are differentiated by the mapper's threads; their gradients are added up.
 
+    With `target_kl` the policy stays within a trust region (as by the line search of Schulman et al. 2015, appendix C):
+    the gradient step that a minibatch shows to have left it is taken back, and the update ends. Adam's steps are as
+    long where gradients are tiny, so without it a policy that is nearly certain may forget everything in one of them.
+
     Returns:
-        Means over the minibatches of `STATISTICS` by name, and the share of the value's variance that the critic
-        explained.
+        Means over the minibatches of `STATISTICS` by name, the share of the value's variance that the critic
+        explained, and the learning rate.
 
     Raises:
         TrainingStopped: a loss, a gradient or a weight is not finite.
@@ -192,6 +199,7 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
         return statistics, torch.autograd.grad(loss, parameters, allow_unused=True)
 
     steps: list[Tensor] = []
+    trusted: list[Tensor] = []  # the weights before the last gradient step
     cut = chunks if config.update == "chunks" else environments
     for shares in cut(session, rollout, batch):
         parts, gradients = zip(*mapper(differentiate, shares), strict=True)
@@ -201,18 +209,24 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
         require_finite("the loss", statistics[0])
         norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
         require_finite("a gradient", norm)
-        session.optimizer.step()
         steps.append(torch.cat((statistics, norm[None])))
-        if (
-            config.target_kl is not None
-            and float(steps[-1][STATISTICS.index("approx_kl")]) > config.target_kl
-        ):
-            break
+        if config.target_kl is not None:
+            if trusted and float(statistics[STATISTICS.index("approx_kl")]) > config.target_kl:
+                with torch.no_grad():
+                    for parameter, value in zip(parameters, trusted, strict=True):
+                        parameter.copy_(value)
+                session.step_scale *= SHORTER
+                break
+            trusted = [parameter.detach().clone() for parameter in parameters]
+        session.optimizer.step()
+    else:
+        session.step_scale = min(1.0, session.step_scale * LONGER)
     for name, value in net.state_dict().items():  # also of its buffers
         require_finite(f"an entry of the network's {name}", value)
     unexplained = (batch.returns - batch.values).var(correction=0) / (batch.returns.var(correction=0) + 1e-8)
     figures = dict(zip(STATISTICS, torch.stack(steps).mean(0).tolist(), strict=True))
     figures["explained_variance"] = 1 - float(unexplained)
+    figures["learning_rate"] = session.optimizer.param_groups[0]["lr"]
     for name, figure in figures.items():
         require_finite(f"{name} of the update", figure)
     return figures

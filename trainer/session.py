@@ -60,6 +60,7 @@ class Session:
     Attributes:
         program: of the scenario that the agent is for.
         update: updates made.
+        step_scale: factor of the learning rate; below 1 after updates that left the trust region.
         generator: the one source of the trainer's randomness.
     """
 
@@ -74,6 +75,7 @@ class Session:
     tutor: Tutor | None = None
     guide: Guide | None = None
     update: int = 0
+    step_scale: float = 1.0
 
     @property
     def frames(self) -> int:
@@ -83,7 +85,7 @@ class Session:
     @property
     def learning_rate(self) -> float:
         """Adam's, now."""
-        return self._scheduled(self.config.lr, self.config.lr_end)
+        return self._scheduled(self.config.lr, self.config.lr_end) * self.step_scale
 
     @property
     def entropy_coef(self) -> float:
@@ -147,6 +149,7 @@ class Session:
                 tensors[f"bonus.{name}"] = torch.from_numpy(np.asarray(array))
         for name, value in vars(self.state).items():
             tensors[f"state.{name}"] = torch.as_tensor(value)
+        tensors["step_scale"] = torch.tensor(self.step_scale, dtype=torch.float64)
         tensors["rng"] = self.generator.get_state()
         tensors["envs"] = _as_tensor(self.envs.snapshot())
         meta = CheckpointMeta(
@@ -193,6 +196,9 @@ class Session:
             self.actor.net.load_state_dict(net.state_dict())
             self._load_adam(checkpoint.part("adam"))
             self._load_state(checkpoint.part("state"))
+            self.step_scale = float(
+                fitting(checkpoint.tensors, "step_scale", torch.zeros((), dtype=torch.float64))
+            )
             self.generator.set_state(checkpoint.tensors["rng"])
             if self.bonus is not None:
                 self.bonus.load_state({k: v.numpy() for k, v in checkpoint.part("bonus").items()})

@@ -57,7 +57,7 @@ def test_reading_gives_back_what_was_written(session: Session, tmp_path: Path) -
 
 def test_everything_a_run_has_to_remember_is_in_it(session: Session) -> None:
     parts = {name.split(".")[0] for name in session.checkpoint().tensors}
-    assert parts == {"net", "adam", "state", "bonus", "rng", "envs"}
+    assert parts == {"net", "adam", "state", "step_scale", "bonus", "rng", "envs"}
     adam = session.checkpoint().part("adam")
     assert len(adam) == 3 * len(list(session.actor.net.parameters()))
 

@@ -168,10 +168,10 @@ def test_a_guided_run_stopped_and_resumed_ends_with_the_same_bits(tmp_path: Path
 
         return progress
 
-    config = guided(
-        small_config, lr_end=1e-4, entropy_coef_end=0.0, checkpoint_every=1, horizon=9, frames=72 * 6
-    )
+    schedules = {"lr_end": 1e-4, "entropy_coef_end": 0.0, "target_kl": 1e-4}
+    config = guided(small_config, **schedules, checkpoint_every=1, horizon=9, frames=72 * 6)
     whole = read(train(config, envs(), tmp_path / "whole"))
+    assert whole.tensors["step_scale"] < 1
     for number, stop in enumerate((2, 4, 5)):  # led, some still led, nobody led any more
         with pytest.raises(Stop):
             train(config, envs(), tmp_path / "parts", stop_after(stop), resume=number > 0)

@@ -346,21 +346,34 @@ def test_statistics_are_finite_and_complete(small_config: Any) -> None:
     statistics = update(session, rollout)
     assert set(statistics) == {
         "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
-        "explained_variance",
+        "explained_variance", "learning_rate",
     }  # fmt: skip
     assert np.isfinite(list(statistics.values())).all()
     assert 0 < statistics["entropy"] <= log(4) + log(2) + log(2) + log(4) + 1e-6
     assert exp(statistics["approx_kl"]) < 2
 
 
-@pytest.mark.parametrize(("target", "expected"), [(None, 6), (1e-5, 2), (1e6, 6)])
-def test_a_divergence_above_the_target_ends_the_update(
-    target: float | None, expected: int, small_config: Any
+@pytest.mark.parametrize(("target", "steps", "scale"), [(None, 6, 1.0), (1e-5, 1, 0.5), (1e6, 6, 1.0)])
+def test_the_step_that_leaves_the_trust_region_is_taken_back(
+    target: float | None, steps: int, scale: float, small_config: Any
 ) -> None:
     session, rollout = played(small_config(epochs=3, target_kl=target))
+    before = [parameter.detach().clone() for parameter in session.actor.net.parameters()]
     update(session, rollout)
-    (steps,) = {int(state["step"]) for state in session.optimizer.state.values()}
-    assert steps == expected, "the first step finds the policy as it acted"
+    made = {int(state["step"]) for state in session.optimizer.state.values()}
+    assert made == {steps}, "the first step finds the policy as it acted"
+    assert session.step_scale == scale
+    kept = [torch.equal(*pair) for pair in zip(before, session.actor.net.parameters(), strict=True)]
+    assert all(kept) == (steps == 1), "the one step was taken back"
+
+
+def test_steps_get_longer_again_up_to_the_schedule(small_config: Any) -> None:
+    session, rollout = played(small_config(target_kl=1e6, lr=1e-3))
+    session.step_scale = 0.7
+    update(session, rollout)
+    assert session.learning_rate == pytest.approx(0.875e-3)
+    update(session, rollout)
+    assert session.learning_rate == pytest.approx(1e-3)
 
 
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -146,8 +146,8 @@ def test_progress_and_metrics_are_complete(tmp_path: Path, small_config: Any) ->
     row = rows(tmp_path)[-1]
     assert set(row) == {
         "update", "frames", "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm",
-        "explained_variance", "bonus", "episodes", "success", "mean_return", "mean_length", "timeouts", "outcomes",
-        "rules",
+        "explained_variance", "learning_rate", "bonus", "episodes", "success", "mean_return", "mean_length", "timeouts",
+        "outcomes", "rules",
     }  # fmt: skip
     assert sum(row["outcomes"].values()) == pytest.approx(1)
     assert row["timeouts"] == pytest.approx(row["outcomes"]["time_out"])
