@@ -595,3 +595,18 @@ def test_a_place_may_have_many_parts_and_a_search_others_within(tmp_path: Path) 
     objects: {{coin: {{type: ball, place: {" | ".join(f"row({y})" for y in (1, 2, 3, 4, 5) * 2)}}}}}
     """
     assert play(tmp_path, text, [STILL])["let"]["there"] == [1, 1]
+
+
+@pytest.mark.parametrize("other", ["nearest(b in balls to coin)", "first(b in balls where b.tagged)"])
+@pytest.mark.parametrize("said", [None, "Find balls 1"])
+def test_a_slot_is_not_even_unlike_what_is_not_found(tmp_path: Path, other: str, said: str | None) -> None:
+    """Neither while the agent is silent, nor while it speaks."""
+    text = f"""
+    grammar: {{templates: [Find <which>], slots: {{which: balls}}}}
+    objects: {{balls: {{type: ball, count: 2, color: red}}, coin: {{type: ball, place: nowhere}}}}
+    state: {{unlike: false, other: false}}
+    rules:
+      - {{when: agent.which != {other}, set: {{unlike: true}}}}
+      - {{when: not (agent.which == {other}), set: {{other: true}}}}
+    """
+    assert play(tmp_path, text, [(None, said)])["state"] == {"unlike": False, "other": False}

@@ -62,14 +62,12 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     arithmetic,
-    asked_first,
     between,
     constants,
     draws,
     entity,
     equals,
     holds_nothing,
-    is_noted,
     is_own_noun,
     may_be_nothing,
     may_find_nothing,
@@ -531,7 +529,7 @@ class ScenarioResolver(Resolver):
                     all_of([_is(word, i), self.equal(value, other, node, scope)])
                     for i, value in enumerate(slot.values)
                 )
-                return asked_first(other, same) if is_noted(other) else same
+                return all_of([*_asked_for(other), same])
             if isinstance(one, Select) and may_be_nothing(one):
                 values = tuple(self.equal(value, other, node, scope) for value in one.values)
                 return Select(BOOL, one.conditions, values, self.equal(one.default, other, node, scope))
@@ -548,8 +546,7 @@ class ScenarioResolver(Resolver):
                 if spoken(left.type, i) == spoken(right.type, j)
             )
             # Both are asked for, even if none of their values are called the same.
-            asked = [side for side in (left, right) if _has_to_be_there(side)]
-            return all_of([*(Compare("==", side, side) for side in asked), alike])
+            return all_of([*_asked_for(left, right), alike])
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
         colored = {left.type.kind, right.type.kind} == {"color", "entity"}
         hint = "the colour of something is `x.color`" if colored else None
@@ -621,9 +618,13 @@ def _both_hold(left: Term, right: Term) -> Term:
     if not empty or (left.type.kind != "int" and not all(_is_unlike(side) for side in (left, right))):
         return alike
     # What makes the whole condition false is asked for first, as an empty register does not ask for the other side.
-    asked = [side for side in (left, right) if side is not empty[0] and _has_to_be_there(side)]
-    there = (Compare("==", side, side) for side in asked)
+    there = _asked_for(*(side for side in (left, right) if side is not empty[0]))
     return all_of([*there, *(_negated(holds_nothing(side)) for side in empty), alike])
+
+
+def _asked_for(*sides: Term) -> list[Term]:
+    """Conditions that ask for what has to be there, and hold where it is."""
+    return [Compare("==", side, side) for side in sides if _has_to_be_there(side)]
 
 
 def _has_to_be_there(term: Term) -> bool:
