@@ -610,3 +610,19 @@ def test_a_slot_is_not_even_unlike_what_is_not_found(tmp_path: Path, other: str,
       - {{when: not (agent.which == {other}), set: {{other: true}}}}
     """
     assert play(tmp_path, text, [(None, said)])["state"] == {"unlike": False, "other": False}
+
+
+def test_who_has_left_the_room_points_at_nothing(tmp_path: Path) -> None:
+    text = """
+    objects: {coin: {type: ball, at: [4, 5]}, box: {type: box, at: [2, 5]}}
+    frames:
+      show: {states: {s: {do: point_at(coin)}}}
+      straight: {states: {s: {do: point(box)}}}
+    cast: {ann: {frame: show, at: [3, 2]}, bob: {frame: straight, at: [2, 2]}}
+    state: {ann_points: {start: 0, range: 0..9}, bob_points: {start: 0, range: 0..9}}
+    rules:
+      - {when: ann.points_at(coin), set: {ann_points: ann_points + 1}}
+      - {when: bob.points_at(box), set: {bob_points: bob_points + 1}}
+      - {when: t == 2, cause: [ann.vanish, bob.vanish]}
+    """
+    assert play(tmp_path, text, [STILL] * 4)["state"] == {"ann_points": 2, "bob_points": 2}

@@ -296,7 +296,9 @@ def _points_at(subject: Term, other: Term) -> Term:
         [Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)]
     )
     at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
-    return all_of([any_of([at_it, straight]), Not(Test("at", subject, other))])
+    # Who has left the room keeps the arm where it was, and points at nothing in there.
+    is_there = equals(FieldOf(BOOL, subject, "gone"), 0)
+    return all_of([any_of([all_of([at_it, is_there]), straight]), Not(Test("at", subject, other))])
 
 
 def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
