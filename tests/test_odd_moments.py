@@ -626,3 +626,24 @@ def test_who_has_left_the_room_points_at_nothing(tmp_path: Path) -> None:
       - {when: t == 2, cause: [ann.vanish, bob.vanish]}
     """
     assert play(tmp_path, text, [STILL] * 4)["state"] == {"ann_points": 2, "bob_points": 2}
+
+
+@pytest.mark.parametrize("asked", ["==", "!="])
+def test_a_conditional_value_that_is_taken_is_there_even_to_be_compared(tmp_path: Path, asked: str) -> None:
+    text = f"""
+    frames:
+      wait:
+        let: {{hue: {{start: none}}, who: {{start: none}}, hues: 0, friends: 0, taken: {{start: 9, range: 0..9}}}}
+        states:
+          s:
+            then:
+              - {{when: t == 1 and (hue if t > 0 else blue) {asked} red, set: {{hues: 1}}}}
+              - {{when: t == 1 and (who if t > 0 else self) {asked} agent, set: {{friends: 1}}}}
+              - {{when: t == 2, set: {{hue: red, who: agent}}}}
+              - when: t > 2 and (hue if t > 0 else blue) == red and (who if t > 0 else self) == agent
+                set: {{taken: 1}}
+    cast: {{ann: {{frame: wait}}}}
+    """
+    found = registers(play(tmp_path, text, [STILL] * 3))
+    assert (found["hues"], found["friends"]) == (0, 0), "an empty register was found"
+    assert found["taken"] == 1
