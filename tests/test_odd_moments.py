@@ -647,3 +647,26 @@ def test_a_conditional_value_that_is_taken_is_there_even_to_be_compared(tmp_path
     found = registers(play(tmp_path, text, [STILL] * 3))
     assert (found["hues"], found["friends"]) == (0, 0), "an empty register was found"
     assert found["taken"] == 1
+
+
+def test_the_cell_of_what_is_gone_empties_what_may_be_empty(tmp_path: Path) -> None:
+    text = """
+    objects: {coin: {type: ball, at: [3, 3]}}
+    frames:
+      note:
+        let: {spot: {start: self.cell}, last: {start: none}, alike: false, empty: false, equal: false}
+        states:
+          s:
+            then:
+              - {when: t == 2, set: {spot: coin.cell, last: coin.cell}}
+              - {when: t == 3 and spot == coin.cell, set: {alike: true}}
+              - {when: t == 4 and last == none, set: {empty: true}}
+              - {when: t == 5 and last == coin.cell, set: {equal: true}}
+    cast: {ann: {frame: note, beliefs: {place: {of: coin.cell}, seen: {of: coin.cell, forget: 9}}}}
+    rules: [{when: t == 1, cause: [coin.vanish]}]
+    """
+    state = play(tmp_path, text, [STILL] * 5)
+    found = registers(state)
+    assert (found["spot"], found["last"]) == ("nowhere", "none")
+    assert (found["alike"], found["empty"], found["equal"]) == (True, True, False)
+    assert state["ann"]["believes"] == {"place": "nowhere", "seen": "none"}

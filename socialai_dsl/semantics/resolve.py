@@ -617,7 +617,9 @@ def _both_hold(left: Term, right: Term) -> Term:
     """Whether two values of one type are equal: nothing is unlike anything, another register with nothing included."""
     alike = Compare("==", left, right)
     empty = [side for side in (left, right) if may_be_nothing(side)]
-    if not empty or (left.type.kind != "int" and not all(_is_unlike(side) for side in (left, right))):
+    # The number of nothing may be that of something else: a number, or the cell of what is in none.
+    shared = left.type.kind in ("int", "cell") or all(_is_unlike(side) for side in (left, right))
+    if not empty or not shared:
         return alike
     # What makes the whole condition false is asked for first, as an empty register does not ask for the other side.
     there = _asked_for(*(side for side in (left, right) if side is not empty[0]))

@@ -12,6 +12,7 @@ from tests.reference.source import Value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
+    NO_CELL,
     NOTHING,
     TYPES,
     Entity,
@@ -260,7 +261,9 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return subject.clock
     if name in context.world.fillers:
         return subject.filled.get(name)
-    if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "type"):
+    if name == "cell":
+        return NO_CELL if subject.cell is None else subject.cell
+    if name in ("kind", "index", "gone", "poked", "was_poked", "action", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":
         found = [thing for thing in context.world.things() if subject in thing.unlocks]
