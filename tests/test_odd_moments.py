@@ -612,6 +612,25 @@ def test_a_slot_is_not_even_unlike_what_is_not_found(tmp_path: Path, other: str,
     assert play(tmp_path, text, [(None, said)])["state"] == {"unlike": False, "other": False}
 
 
+@pytest.mark.parametrize(("one", "other"), [("n", "m"), ("n", "n"), ("which", "whose"), ("which", "which")])
+@pytest.mark.parametrize("said", [None, "Give balls 1 and balls 1, 2 of 2"])
+def test_what_is_not_said_in_one_slot_is_unlike_what_is_not_in_another(
+    tmp_path: Path, one: str, other: str, said: str | None
+) -> None:
+    text = f"""
+    grammar:
+      templates: ["Give <which> and <whose>, <n> of <m>"]
+      slots: {{which: balls, whose: balls, n: 1..3, m: 1..3}}
+    objects: {{balls: {{type: ball, count: 2, color: red}}}}
+    state: {{like: false, unlike: false}}
+    rules:
+      - {{when: agent.{one} == agent.{other}, set: {{like: true}}}}
+      - {{when: agent.{one} != agent.{other}, set: {{unlike: true}}}}
+    """
+    like = said is not None
+    assert play(tmp_path, text, [(None, said)])["state"] == {"like": like, "unlike": not like}
+
+
 def test_who_has_left_the_room_points_at_nothing(tmp_path: Path) -> None:
     text = """
     objects: {coin: {type: ball, at: [4, 5]}, box: {type: box, at: [2, 5]}}

@@ -531,7 +531,7 @@ class ScenarioResolver(Resolver):
                     all_of([_is(word, i), self.equal(value, other, node, scope)])
                     for i, value in enumerate(slot.values)
                 )
-                return all_of([*_asked_for(other), same])
+                return same if other in self.slot_words else all_of([*_asked_for(other), same])
             if isinstance(one, Select) and may_be_nothing(one):
                 values = tuple(self.equal(value, other, node, scope) for value in one.values)
                 return Select(BOOL, one.conditions, values, self.equal(one.default, other, node, scope))
@@ -616,6 +616,11 @@ class ScenarioResolver(Resolver):
 def _both_hold(left: Term, right: Term) -> Term:
     """Whether two values of one type are equal: nothing is unlike anything, another register with nothing included."""
     alike = Compare("==", left, right)
+    if is_own_noun(left) and is_own_noun(
+        right
+    ):  # what is not said in one slot is unlike what is not in another
+        is_said = between(left, Const(left.type, left.type.low), Const(left.type, left.type.high))
+        return all_of([is_said, alike])
     empty = [side for side in (left, right) if may_be_nothing(side)]
     # The number of nothing may be that of something else: a number, or the cell of what is in none.
     shared = left.type.kind in ("int", "cell") or all(_is_unlike(side) for side in (left, right))

@@ -287,8 +287,8 @@ def _logic(node: ast.Logic, context: Context) -> bool:
 
 def same(a: Any, b: Any) -> bool:
     """Equality. A value fits a noun if their texts are equal, so 3 is "3"; an entity in a cell is not the cell."""
-    if a is NOTHING or b is NOTHING:
-        return False
+    if any(one is None or one is NOTHING for one in (a, b)):
+        return False  # what is not there equals no value, and nothing else that is not there
     if isinstance(a, Entity) or isinstance(b, Entity):
         return a is b
     if isinstance(a, Recall) and isinstance(b, Performance):
