@@ -595,3 +595,97 @@ def test_a_place_may_have_many_parts_and_a_search_others_within(tmp_path: Path) 
     objects: {{coin: {{type: ball, place: {" | ".join(f"row({y})" for y in (1, 2, 3, 4, 5) * 2)}}}}}
     """
     assert play(tmp_path, text, [STILL])["let"]["there"] == [1, 1]
+
+
+@pytest.mark.parametrize("other", ["nearest(b in balls to coin)", "first(b in balls where b.tagged)"])
+@pytest.mark.parametrize("said", [None, "Find balls 1"])
+def test_a_slot_is_not_even_unlike_what_is_not_found(tmp_path: Path, other: str, said: str | None) -> None:
+    """Neither while the agent is silent, nor while it speaks."""
+    text = f"""
+    grammar: {{templates: [Find <which>], slots: {{which: balls}}}}
+    objects: {{balls: {{type: ball, count: 2, color: red}}, coin: {{type: ball, place: nowhere}}}}
+    state: {{unlike: false, other: false}}
+    rules:
+      - {{when: agent.which != {other}, set: {{unlike: true}}}}
+      - {{when: not (agent.which == {other}), set: {{other: true}}}}
+    """
+    assert play(tmp_path, text, [(None, said)])["state"] == {"unlike": False, "other": False}
+
+
+@pytest.mark.parametrize(("one", "other"), [("n", "m"), ("n", "n"), ("which", "whose"), ("which", "which")])
+@pytest.mark.parametrize("said", [None, "Give balls 1 and balls 1, 2 of 2"])
+def test_what_is_not_said_in_one_slot_is_unlike_what_is_not_in_another(
+    tmp_path: Path, one: str, other: str, said: str | None
+) -> None:
+    text = f"""
+    grammar:
+      templates: ["Give <which> and <whose>, <n> of <m>"]
+      slots: {{which: balls, whose: balls, n: 1..3, m: 1..3}}
+    objects: {{balls: {{type: ball, count: 2, color: red}}}}
+    state: {{like: false, unlike: false}}
+    rules:
+      - {{when: agent.{one} == agent.{other}, set: {{like: true}}}}
+      - {{when: agent.{one} != agent.{other}, set: {{unlike: true}}}}
+    """
+    like = said is not None
+    assert play(tmp_path, text, [(None, said)])["state"] == {"like": like, "unlike": not like}
+
+
+def test_who_has_left_the_room_points_at_nothing(tmp_path: Path) -> None:
+    text = """
+    objects: {coin: {type: ball, at: [4, 5]}, box: {type: box, at: [2, 5]}}
+    frames:
+      show: {states: {s: {do: point_at(coin)}}}
+      straight: {states: {s: {do: point(box)}}}
+    cast: {ann: {frame: show, at: [3, 2]}, bob: {frame: straight, at: [2, 2]}}
+    state: {ann_points: {start: 0, range: 0..9}, bob_points: {start: 0, range: 0..9}}
+    rules:
+      - {when: ann.points_at(coin), set: {ann_points: ann_points + 1}}
+      - {when: bob.points_at(box), set: {bob_points: bob_points + 1}}
+      - {when: t == 2, cause: [ann.vanish, bob.vanish]}
+    """
+    assert play(tmp_path, text, [STILL] * 4)["state"] == {"ann_points": 2, "bob_points": 2}
+
+
+@pytest.mark.parametrize("asked", ["==", "!="])
+def test_a_conditional_value_that_is_taken_is_there_even_to_be_compared(tmp_path: Path, asked: str) -> None:
+    text = f"""
+    frames:
+      wait:
+        let: {{hue: {{start: none}}, who: {{start: none}}, hues: 0, friends: 0, taken: {{start: 9, range: 0..9}}}}
+        states:
+          s:
+            then:
+              - {{when: t == 1 and (hue if t > 0 else blue) {asked} red, set: {{hues: 1}}}}
+              - {{when: t == 1 and (who if t > 0 else self) {asked} agent, set: {{friends: 1}}}}
+              - {{when: t == 2, set: {{hue: red, who: agent}}}}
+              - when: t > 2 and (hue if t > 0 else blue) == red and (who if t > 0 else self) == agent
+                set: {{taken: 1}}
+    cast: {{ann: {{frame: wait}}}}
+    """
+    found = registers(play(tmp_path, text, [STILL] * 3))
+    assert (found["hues"], found["friends"]) == (0, 0), "an empty register was found"
+    assert found["taken"] == 1
+
+
+def test_the_cell_of_what_is_gone_empties_what_may_be_empty(tmp_path: Path) -> None:
+    text = """
+    objects: {coin: {type: ball, at: [3, 3]}}
+    frames:
+      note:
+        let: {spot: {start: self.cell}, last: {start: none}, alike: false, empty: false, equal: false}
+        states:
+          s:
+            then:
+              - {when: t == 2, set: {spot: coin.cell, last: coin.cell}}
+              - {when: t == 3 and spot == coin.cell, set: {alike: true}}
+              - {when: t == 4 and last == none, set: {empty: true}}
+              - {when: t == 5 and last == coin.cell, set: {equal: true}}
+    cast: {ann: {frame: note, beliefs: {place: {of: coin.cell}, seen: {of: coin.cell, forget: 9}}}}
+    rules: [{when: t == 1, cause: [coin.vanish]}]
+    """
+    state = play(tmp_path, text, [STILL] * 5)
+    found = registers(state)
+    assert (found["spot"], found["last"]) == ("nowhere", "none")
+    assert (found["alike"], found["empty"], found["equal"]) == (True, True, False)
+    assert state["ann"]["believes"] == {"place": "nowhere", "seen": "none"}

@@ -13,6 +13,7 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
     Const,
+    Operation,
     Select,
     Term,
     Type,
@@ -105,10 +106,19 @@ def _taken(branches: Sequence[_Branch]) -> Term:
             last = branch
             break
     if not kept:
-        return last.value
-    values = [branch.value for branch in (*kept, last)]
+        return _needed(last.value)
+    values = [_needed(branch.value) for branch in (*kept, last)]
     conditions = tuple(branch.condition for branch in kept if branch.condition is not None)
     return Select(common_type(values), conditions, tuple(values[:-1]), values[-1])
+
+
+def _needed(value: Term) -> Term:
+    """A value that is taken: in a comparison too an empty register is not found then, as an operand never is."""
+    return (
+        Operation(value.type, "max", (value, Const(value.type, value.type.low)))
+        if may_be_nothing(value)
+        else value
+    )
 
 
 # -- texts, which have words of their own ----------------------------------------------------------------------

@@ -62,14 +62,12 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     arithmetic,
-    asked_first,
     between,
     constants,
     draws,
     entity,
     equals,
     holds_nothing,
-    is_noted,
     is_own_noun,
     may_be_nothing,
     may_find_nothing,
@@ -298,7 +296,9 @@ def _points_at(subject: Term, other: Term) -> Term:
         [Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)]
     )
     at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
-    return all_of([any_of([at_it, straight]), Not(Test("at", subject, other))])
+    # Who has left the room keeps the arm where it was, and points at nothing in there.
+    is_there = equals(FieldOf(BOOL, subject, "gone"), 0)
+    return all_of([any_of([all_of([at_it, is_there]), straight]), Not(Test("at", subject, other))])
 
 
 def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
@@ -531,7 +531,7 @@ class ScenarioResolver(Resolver):
                     all_of([_is(word, i), self.equal(value, other, node, scope)])
                     for i, value in enumerate(slot.values)
                 )
-                return asked_first(other, same) if is_noted(other) else same
+                return same if other in self.slot_words else all_of([*_asked_for(other), same])
             if isinstance(one, Select) and may_be_nothing(one):
                 values = tuple(self.equal(value, other, node, scope) for value in one.values)
                 return Select(BOOL, one.conditions, values, self.equal(one.default, other, node, scope))
@@ -548,8 +548,7 @@ class ScenarioResolver(Resolver):
                 if spoken(left.type, i) == spoken(right.type, j)
             )
             # Both are asked for, even if none of their values are called the same.
-            asked = [side for side in (left, right) if _has_to_be_there(side)]
-            return all_of([*(Compare("==", side, side) for side in asked), alike])
+            return all_of([*_asked_for(left, right), alike])
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
         colored = {left.type.kind, right.type.kind} == {"color", "entity"}
         hint = "the colour of something is `x.color`" if colored else None
@@ -617,13 +616,24 @@ class ScenarioResolver(Resolver):
 def _both_hold(left: Term, right: Term) -> Term:
     """Whether two values of one type are equal: nothing is unlike anything, another register with nothing included."""
     alike = Compare("==", left, right)
+    if is_own_noun(left) and is_own_noun(
+        right
+    ):  # what is not said in one slot is unlike what is not in another
+        is_said = between(left, Const(left.type, left.type.low), Const(left.type, left.type.high))
+        return all_of([is_said, alike])
     empty = [side for side in (left, right) if may_be_nothing(side)]
-    if not empty or (left.type.kind != "int" and not all(_is_unlike(side) for side in (left, right))):
+    # The number of nothing may be that of something else: a number, or the cell of what is in none.
+    shared = left.type.kind in ("int", "cell") or all(_is_unlike(side) for side in (left, right))
+    if not empty or not shared:
         return alike
     # What makes the whole condition false is asked for first, as an empty register does not ask for the other side.
-    asked = [side for side in (left, right) if side is not empty[0] and _has_to_be_there(side)]
-    there = (Compare("==", side, side) for side in asked)
+    there = _asked_for(*(side for side in (left, right) if side is not empty[0]))
     return all_of([*there, *(_negated(holds_nothing(side)) for side in empty), alike])
+
+
+def _asked_for(*sides: Term) -> list[Term]:
+    """Conditions that ask for what has to be there, and hold where it is."""
+    return [Compare("==", side, side) for side in sides if _has_to_be_there(side)]
 
 
 def _has_to_be_there(term: Term) -> bool:

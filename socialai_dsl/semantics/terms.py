@@ -679,11 +679,6 @@ def may_find_nothing(term: Term) -> bool:
     return False
 
 
-def is_noted(term: Term) -> bool:
-    """Whether a term is `prev(...)`, which finds nothing where nothing was found then."""
-    return isinstance(term, Read) and term.path.startswith(NOTED)
-
-
 def is_own_noun(term: Term) -> bool:
     """Whether a term is `agent.noun`: while the agent is silent, that is unlike any noun."""
     return isinstance(term, World) and term.name == "noun"

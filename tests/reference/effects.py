@@ -10,7 +10,7 @@ from socialai_dsl.grammar.ast import ParseProblem
 from tests.reference import geometry
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, key_of, of, something, there
 from tests.reference.source import Sources
-from tests.reference.world import NOTHING, TYPES, Cell, Entity, World, as_list, where
+from tests.reference.world import NO_CELL, NOTHING, TYPES, Cell, Entity, World, as_list, where
 
 Cause = tuple[str, list[Entity], Any]
 
@@ -174,6 +174,8 @@ def assign(world: World, me: Entity | None, values: list[tuple[str, Any, Any]]) 
         if name in holder.ranges and value is not NOTHING:
             low, high = holder.ranges[name]
             value = min(max(value, low), high)
+        if value == NO_CELL and name in holder.may_be_nothing:
+            value = NOTHING
         if key is None:
             holder.registers[name] = value
         else:

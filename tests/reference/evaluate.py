@@ -12,6 +12,7 @@ from tests.reference.source import Value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
+    NO_CELL,
     NOTHING,
     TYPES,
     Entity,
@@ -260,7 +261,9 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return subject.clock
     if name in context.world.fillers:
         return subject.filled.get(name)
-    if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "type"):
+    if name == "cell":
+        return NO_CELL if subject.cell is None else subject.cell
+    if name in ("kind", "index", "gone", "poked", "was_poked", "action", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":
         found = [thing for thing in context.world.things() if subject in thing.unlocks]
@@ -284,8 +287,8 @@ def _logic(node: ast.Logic, context: Context) -> bool:
 
 def same(a: Any, b: Any) -> bool:
     """Equality. A value fits a noun if their texts are equal, so 3 is "3"; an entity in a cell is not the cell."""
-    if a is NOTHING or b is NOTHING:
-        return False
+    if any(one is None or one is NOTHING for one in (a, b)):
+        return False  # what is not there equals no value, and nothing else that is not there
     if isinstance(a, Entity) or isinstance(b, Entity):
         return a is b
     if isinstance(a, Recall) and isinstance(b, Performance):

@@ -11,7 +11,7 @@ from tests.reference.effects import Cause, affect, assign, assignments, causes
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern, there
 from tests.reference.script import Belief, Entry, Frame, Rule, Source, Step
 from tests.reference.source import Sources
-from tests.reference.world import NOTHING, Entity, World
+from tests.reference.world import NO_CELL, NOTHING, Entity, World
 
 
 @dataclass
@@ -60,7 +60,8 @@ class FrameRunner:
             found = (self.said_by_source(belief, place, source) for place, source in belief.sources(site))
             value = next((one for one in found if one is not NOTHING), NOTHING)
             if value is not NOTHING:
-                self.me.believes[name], self.me.ages[name] = value, 0
+                is_none = belief.may_be_nothing and value == NO_CELL
+                self.me.believes[name], self.me.ages[name] = NOTHING if is_none else value, 0
             elif belief.forget is not None and self.forgets(name, belief, site):
                 self.me.believes[name] = NOTHING
 

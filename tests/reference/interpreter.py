@@ -19,7 +19,7 @@ from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
-from tests.reference.world import NOTHING, Entity, Heard, Kept, Performance, World, as_list
+from tests.reference.world import NO_CELL, NOTHING, Entity, Heard, Kept, Performance, World, as_list
 
 Action = tuple[int, ...]
 ATTEMPTS = 64
@@ -489,6 +489,8 @@ class Reference:
 
 def plain(value: Any) -> Any:
     """A value as data: entities by name, cells as lists."""
+    if value == NO_CELL:
+        return None
     if isinstance(value, Entity):
         return value.key if value.sort != "object" or value.single else f"{value.key}[{value.index}]"
     if isinstance(value, tuple | list):

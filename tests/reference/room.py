@@ -15,6 +15,7 @@ from tests.reference.speech import noun_value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
+    NO_CELL,
     NOTHING,
     TYPES,
     Cell,
@@ -412,7 +413,9 @@ class Setup:
                 written = belief.start if source is None else source.of
                 frame = member.frame if belief.from_ else None
                 value = self.sources.expression(place, written, frame)
-                member.believes[name] = evaluate(value, self.context(member))
+                found = evaluate(value, self.context(member))
+                is_none = belief.may_be_nothing and found == NO_CELL
+                member.believes[name] = NOTHING if is_none else found
 
     def distinct_colors(self, path: str, group: list[Entity]) -> None:
         """One after another, each among the colours that are not taken yet."""

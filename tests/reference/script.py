@@ -139,6 +139,11 @@ class Belief:
     from_: tuple[Source, ...] = ()
     forget: Any = None
 
+    @property
+    def may_be_nothing(self) -> bool:
+        """Whether a member may have none; the cell of what is not in the room is none then."""
+        return str(self.start) == "none" or self.forget is not None
+
     def sources(self, site: str) -> list[tuple[str, Source]]:
         """Each with the place where it is written."""
         if not self.from_:

@@ -102,6 +102,9 @@ class Nothing:
 
 NOTHING = Nothing()
 
+NO_CELL = -1, -1
+"""The cell of what is not in the room: a value like others, which nothing is on; it empties what may be empty."""
+
 
 @dataclass
 class Kept:
@@ -340,7 +343,8 @@ def as_list(value: Any) -> list[Any]:
 
 def where(thing: Any) -> Cell | None:
     """The cell of an entity, or a cell itself."""
-    return thing.cell if isinstance(thing, Entity) else thing
+    cell = thing.cell if isinstance(thing, Entity) else thing
+    return None if cell == NO_CELL else cell
 
 
 def step_from(cell: Cell, direction: str) -> Cell:

@@ -13,6 +13,9 @@ from tests.scenario_fuzzer.phrases import Phrases, Where
 ALWAYS_OPEN = ("face", "follow", "stay_near", "flee", "wander", "choose")
 """Activities that never end by themselves."""
 
+LONGEST_TARGET = 200
+"""Characters of a key of `set`; the language takes no longer ones."""
+
 
 class Behaviour:
     """Makes frames and rules of what is declared."""
@@ -140,7 +143,7 @@ class Behaviour:
         registers = self.registers(where)
         if registers and self.often(probability * 0.7):
             chosen = self.rng.sample(sorted(registers), min(len(registers), self.rng.randint(1, 2)))
-            made["set"] = {name: registers[name]() for name in chosen}
+            made["set"] = {name: registers[name]() for name in chosen if len(name) <= LONGEST_TARGET}
         if self.often(probability):
             made["cause"] = [self.effect(where) for _ in range(self.rng.randint(1, 3))]
         if where.frame is not None and self.often(probability):
