@@ -612,6 +612,19 @@ def test_a_slot_is_not_even_unlike_what_is_not_found(tmp_path: Path, other: str,
     assert play(tmp_path, text, [(None, said)])["state"] == {"unlike": False, "other": False}
 
 
+@pytest.mark.parametrize("group", ["one | nearest(b in balls to coin)", "nearest(b in balls to coin) | one"])
+@pytest.mark.parametrize("asked", ["in", "not in"])
+def test_all_that_something_may_be_one_of_is_asked_for(tmp_path: Path, group: str, asked: str) -> None:
+    """Also what stands after one that it is."""
+    text = f"""
+    objects: {{balls: {{type: ball, count: 2, color: red}}, coin: {{type: ball, place: nowhere}}}}
+    let: {{one: first(balls)}}
+    state: {{held: false}}
+    rules: [{{when: one {asked} {group}, set: {{held: true}}}}]
+    """
+    assert play(tmp_path, text, [STILL])["state"] == {"held": False}
+
+
 @pytest.mark.parametrize(("one", "other"), [("n", "m"), ("n", "n"), ("which", "whose"), ("which", "which")])
 @pytest.mark.parametrize("said", [None, "Give balls 1 and balls 1, 2 of 2"])
 def test_what_is_not_said_in_one_slot_is_unlike_what_is_not_in_another(

@@ -527,8 +527,15 @@ class _Report:
     def _bad_name(self, finding: _Finding) -> None:
         key = str(finding.path[-1])
         span = self._places.key_span(finding.path)
-        hint = "a name has letters, digits and `_`, and does not begin with a digit; 40 characters at most"
-        self._bag.error("S104", f"`{key}` is not a name", span, hint=hint)
+        if finding.path[-2:-1] == ("set",) and "max_length" in finding.context:
+            hint = "a name in `define` can stand for a part of it"
+            message = f"what is set has more than {finding.context['max_length']} characters"
+            self._bag.error("S106", message, span, hint=hint)
+        else:
+            hint = (
+                "a name has letters, digits and `_`, and does not begin with a digit; 40 characters at most"
+            )
+            self._bag.error("S104", f"`{key}` is not a name", span, hint=hint)
         self._repaired.leave_out(finding.path)
 
     # -- values ----------------------------------------------------------------------------------------------

@@ -561,7 +561,10 @@ class ScenarioResolver(Resolver):
             left = self.value(node.left, self._element(lead, scope), scope)
         else:
             left = self.value(node.left, None, scope)
-        found = any_of(self._among(left, option, node, scope) for option in options)
+        values: list[Term] = []
+        found = any_of(self._among(left, option, node, scope, values) for option in options)
+        if len(options) > 1:  # all are asked for, also those after one that it is
+            found = all_of([*_asked_for(*(one for one in values if one not in self.slot_words)), found])
         return _negated(found) if node.negated else found
 
     def _element(self, option: ast.Expr, scope: Scope) -> Type:
@@ -574,7 +577,8 @@ class ScenarioResolver(Resolver):
     def _options(self, node: ast.Expr) -> tuple[ast.Expr, ...]:
         return node.options if isinstance(node, ast.Alternatives) else (node,)
 
-    def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope) -> Term:
+    def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope, values: list[Term]) -> Term:
+        """Whether a value is one option, or one of it; an option that is a value itself is added to `values`."""
         if isinstance(option, ast.Interval):
             left = self.fit(left, INT, option, scope)
             return between(left, self.value(option.low, INT, scope), self.value(option.high, INT, scope))
@@ -584,7 +588,8 @@ class ScenarioResolver(Resolver):
             if not alike or left in self.slot_words:
                 return any_of(self.equal(left, item, node, scope) for item in group.items)
             return one_of(left, group.items)
-        return self.equal(left, self.guess(option, left.type, scope), option, scope)
+        values.append(self.guess(option, left.type, scope))
+        return self.equal(left, values[-1], option, scope)
 
     # -- arithmetic ------------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import chance, geometry, motion
-from tests.reference.evaluate import Context, NothingFoundError, drawn, of, something, weighed
+from tests.reference.evaluate import Context, NothingFoundError, drawn, of, there, weighed
 from tests.reference.source import Value
 from tests.reference.world import (
     TYPES,
@@ -227,13 +227,13 @@ def plan(value: Value, context: Context) -> Activity:
     assert isinstance(node, ast.Call), "internal: no activity"
     if node.name == "search":
         return Activity("search", sees=partial(sees, replace(node, name="sees"), context))
-    return Activity(node.name, *(something(of(argument, context)) for argument in node.args))
+    return Activity(node.name, *(there(of(argument, context)) for argument in node.args))
 
 
 def sees(condition: ast.Call, context: Context) -> bool:
     """Whether what is searched for is in view; what is not found is not."""
     try:
-        return bool(something(of(condition, context)))
+        return bool(there(of(condition, context)))
     except NothingFoundError:
         return False
 

@@ -8,7 +8,7 @@ from typing import Any
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem
 from tests.reference import geometry
-from tests.reference.evaluate import Context, NothingFoundError, evaluate, key_of, of, something, there
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, key_of, of, there
 from tests.reference.source import Sources
 from tests.reference.world import NO_CELL, NOTHING, TYPES, Cell, Entity, World, as_list, where
 
@@ -50,10 +50,10 @@ def cause(node: Any, context: Context) -> Cause:
     """One effect."""
     if isinstance(node, ast.Name):
         return node.id, as_list(context.me), None
-    subject = as_list(context.me) if node.subject is None else as_list(something(of(node.subject, context)))
+    subject = as_list(context.me) if node.subject is None else as_list(there(of(node.subject, context)))
     status: Any = None
     if node.name in ("put", "move_into"):
-        status = something(of(node.args[0], context))
+        status = there(of(node.args[0], context))
     elif isinstance(node, ast.Call) and node.args:
         status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
     return node.name, subject, status

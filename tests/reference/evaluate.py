@@ -210,7 +210,7 @@ def _attribute(node: ast.Attribute, context: Context) -> Any:
         and node.subject.id in context.world.fillers
     ):
         return [speech.noun_value(filler.word) for filler in context.world.fillers[node.subject.id]]
-    subject = something(there(of(node.subject, context)))
+    subject = there(of(node.subject, context))
     if isinstance(subject, list):
         return [attribute(item, node.name, context) for item in subject]
     return attribute(subject, node.name, context)
@@ -309,13 +309,6 @@ def there(value: Any) -> Any:
     return value
 
 
-def something(value: Any) -> Any:
-    """A thing, a cell or a word that something is asked of."""
-    if value is NOTHING:
-        raise NothingFoundError
-    return value
-
-
 def _compare(node: ast.Compare, context: Context) -> bool:
     left, right = of(node.left, context), of(node.right, context)
     sides = ((left, node.right), (right, node.left))
@@ -404,7 +397,7 @@ def _quantifier(node: ast.Quantifier, context: Context) -> Any:
     if node.name == "count":
         return len(found)
     if node.name == "nearest":
-        goal = where(something(of(node.to, context)))
+        goal = where(there(of(node.to, context)))
         found = [item for item in found if where(item) is not None and goal is not None]
         found.sort(key=lambda item: geometry.apart(item, goal))
     if not found and context.take_first and group:
@@ -454,8 +447,8 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
             for text in texts
             for asked in patterns
         )
-    something(subject)
-    arguments = [something(of(argument, context)) for argument in node.args]
+    there(subject)
+    arguments = [there(of(argument, context)) for argument in node.args]
     if name == "carries":
         return any(thing.carrier is subject for thing in as_list(arguments[0]))
     if name == "toggled_by":
