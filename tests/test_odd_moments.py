@@ -702,3 +702,18 @@ def test_the_cell_of_what_is_gone_empties_what_may_be_empty(tmp_path: Path) -> N
     assert (found["spot"], found["last"]) == ("nowhere", "none")
     assert (found["alike"], found["empty"], found["equal"]) == (True, True, False)
     assert state["ann"]["believes"] == {"place": "nowhere", "seen": "none"}
+
+
+@pytest.mark.parametrize("choice", ["nearest(b in boxes to coin)", "first(b in boxes where not coin.gone)"])
+def test_who_accepts_on_a_condition_that_finds_nothing_takes_nothing(tmp_path: Path, choice: str) -> None:
+    """Though the condition held in an earlier step."""
+    text = f"""
+    objects: {{coin: {{type: ball, carryable: true, at: [3, 3]}}, boxes: {{type: box, count: 2, at: [[5, 3], [5, 5]]}}}}
+    frames: {{hand_over: {{steps: [{{do: fetch(coin)}}, {{do: "give(coin, bob)", for: 4}}]}}}}
+    cast:
+      ann: {{frame: hand_over, at: [3, 4], facing: up}}
+      bob: {{at: [3, 5], accepts: "{choice}.shut"}}
+    """
+    state = play(tmp_path, text, [STILL] * 5)
+    assert state["ann"]["carries"] == "coin"
+    assert "carries" not in state["bob"]
