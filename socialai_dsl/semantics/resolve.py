@@ -621,9 +621,8 @@ class ScenarioResolver(Resolver):
 def _both_hold(left: Term, right: Term) -> Term:
     """Whether two values of one type are equal: nothing is unlike anything, another register with nothing included."""
     alike = Compare("==", left, right)
-    if is_own_noun(left) and is_own_noun(
-        right
-    ):  # what is not said in one slot is unlike what is not in another
+    # What is not said in one slot is unlike what is not said in another.
+    if is_own_noun(left) and is_own_noun(right):
         is_said = between(left, Const(left.type, left.type.low), Const(left.type, left.type.high))
         return all_of([is_said, alike])
     empty = [side for side in (left, right) if may_be_nothing(side)]
