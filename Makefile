@@ -23,7 +23,8 @@ help: ## list the targets
 run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="--frames 50000"
 	$(BIN)/socialai-run scenarios/talkitout.yaml $(ARGS)
 
-PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
+# Not those of pages in a browser: Playwright leaves an event loop running, in which no other test can run its own.
+PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --ignore tests/browser
 
 test: $(STAMP) ## run the tests, on up to four cores at once
 	$(BIN)/python -m pytest $(PARALLEL) $(ARGS)
