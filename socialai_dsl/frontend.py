@@ -29,7 +29,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import display_name, read_document
+from socialai_dsl.loader.reader import SUFFIXES, display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -203,9 +203,6 @@ def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
         hint = f'write "{text} {comment[1]}" if it belongs to the text, else a blank behind the `#`'
         yield Diagnostic("W009", message, place, Severity.WARNING, hint)
-
-
-SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)

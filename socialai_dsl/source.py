@@ -222,14 +222,14 @@ Children: TypeAlias = "dict[str, Node] | list[Node] | None"
 class Node:
     """A part of a document. Its root stands for the whole, also of a scenario that several files are put together to.
 
-    What does not exist is where its nearest ancestor is.
+    A part that does not exist has the place of its nearest ancestor.
 
     Attributes:
         span: where it is written.
         value: the scalar's value; None for a mapping or list.
         children: the entries of a mapping or list; None for a scalar.
         substituted: whether it is the value of a parameter, so that places inside of it mean nothing.
-        left_out: whether it has a mistake that was reported, so that it is no part of the data; it keeps its place.
+        left_out: whether a mistake in it was reported; it is then missing from the data, but keeps its place.
     """
 
     __slots__ = ("children", "left_out", "span", "substituted", "value")
@@ -348,7 +348,7 @@ class Node:
     # -- changes ---------------------------------------------------------------------------------------------
 
     def put(self, data: Data) -> None:
-        """Put data in place of what is written here; all parts of it stand where this one does."""
+        """Replace this part by data, all of which gets the place of this part."""
         self.value, self.children = None, None
         if isinstance(data, dict):
             self.children = {key: self._here(part) for key, part in data.items()}

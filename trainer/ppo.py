@@ -176,9 +176,10 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
 
     A minibatch's shares are differentiated by the mapper's threads; their gradients are added up.
 
-    With `target_kl` the policy stays within a trust region (as by the line search of Schulman et al. 2015, appendix C):
-    the gradient step that a minibatch shows to have left it is taken back, and the update ends. Adam's steps are as
-    long where gradients are tiny, so without it a policy that is nearly certain may forget everything in one of them.
+    `target_kl` limits the divergence from the policy that played by backtracking, as the line search of Schulman et al.
+    2015 (appendix C) does: where a minibatch finds it exceeded, the gradient step before is undone, the update ends,
+    and later steps are shorter. No minibatch measures the last step of an update. Adam's steps are long even where
+    gradients are tiny, so one of them can undo what a nearly certain policy has learnt.
 
     Returns:
         Means over the minibatches of `STATISTICS` by name, the share of the value's variance that the critic

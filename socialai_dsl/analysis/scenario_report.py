@@ -25,7 +25,7 @@ class ScenarioReport:
         outcomes: where the outcomes are written.
         tried: its properties with what was found. coverage: what of it never happens, if that was tried.
         depth: what success takes, if that was tried.
-        complete: whether nothing more comes. interrupted: whether somebody stopped it.
+        complete: whether the check has ended. interrupted: whether the user stopped it.
     """
 
     scenario: str

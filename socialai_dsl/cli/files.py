@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
 STDIN: Final = "-"
 
-_SUFFIXES: Final = frozenset({".yaml", ".yml"})
-
 
 def yaml_files(folder: str) -> list[str]:
     """The YAML files under a folder, sorted.
@@ -21,7 +19,9 @@ def yaml_files(folder: str) -> list[str]:
     Raises:
         UsageError: there is none.
     """
-    names = sorted(str(p) for p in Path(folder).rglob("*") if p.suffix in _SUFFIXES and p.is_file())
+    from socialai_dsl.loader.reader import SUFFIXES
+
+    names = sorted(str(p) for p in Path(folder).rglob("*") if p.suffix in SUFFIXES and p.is_file())
     if not names:
         raise UsageError(f"{folder}: expected scenario files (*.yaml) in this folder, found none")
     return names

@@ -11,7 +11,7 @@ from typing import Final
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.frontend import SUFFIXES
+from socialai_dsl.loader.reader import SUFFIXES
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
 _PORT: Final = 8765

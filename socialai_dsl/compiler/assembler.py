@@ -298,7 +298,7 @@ def store(
     name = next(name for name in registers.names if name.path == path)
     assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
     if not name.values and not is_nothing:
-        # The cell of what is in none is a value, and the number of nothing where a register of cells may hold nothing.
+        # "No cell" is a value of its own; a register of cells that may be empty stores it as the number of nothing.
         emit(Op.MAX, value, value, constant(name.low if name.kind == "cell" else name.least))
         emit(Op.MIN, value, value, constant(name.high))
     if key is None:

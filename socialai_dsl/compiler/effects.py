@@ -391,7 +391,7 @@ def _remember(to: Expressions, item: Drawn) -> None:
     mark = block.taken
     if found is not None:
         block.emit(Op.LOAD, found, constant(0))
-        # What takes the condition as it is, as `accepts` does, knows of no `found`.
+        # `accepts` reads the condition alone, without `found`.
         if item.type.kind == "bool":
             block.emit(Op.LOAD, to.registers.by_path[item.path], constant(0))
         to.failed = missing

@@ -1,4 +1,4 @@
-"""Files to positioned trees: found, read once, counted; YAML from the parser's events, within fixed limits."""
+"""Finds the files of a scenario and reads each once, as a positioned tree, within fixed limits."""
 
 from __future__ import annotations
 
@@ -607,7 +607,7 @@ def shipped_experiments() -> dict[str, Path]:
 class Library:
     """Reads the files of one scenario; none outside `roots` and the shipped folder is ever opened.
 
-    `texts` (resolved path -> text) stand for files that are not on the disk as they are meant.
+    `texts` (resolved path -> text) replace files, as an editor does whose text is not saved yet.
 
     Attributes:
         shipped: the folder of the shipped scenarios, resolved.

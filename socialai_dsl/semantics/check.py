@@ -489,7 +489,7 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
-        asked = probes(resolver) if self._scenario.probes else ()
+        asked = probes(resolver)
         for rule in rules:
             self._look_at_size(rule)
         for plan in plans:

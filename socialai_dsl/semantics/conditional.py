@@ -113,7 +113,7 @@ def _taken(branches: Sequence[_Branch]) -> Term:
 
 
 def _needed(value: Term) -> Term:
-    """A value that is taken: in a comparison too an empty register is not found then, as an operand never is."""
+    """The value of a branch as an operand, so that an empty register is not found, also in a comparison."""
     return (
         Operation(value.type, "max", (value, Const(value.type, value.type.low)))
         if may_be_nothing(value)

@@ -296,7 +296,7 @@ def _points_at(subject: Term, other: Term) -> Term:
         [Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)]
     )
     at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
-    # Who has left the room keeps the arm where it was, and points at nothing in there.
+    # The arm of an NPC that leaves the room stays as it was, but points at nothing.
     is_there = equals(FieldOf(BOOL, subject, "gone"), 0)
     return all_of([any_of([all_of([at_it, is_there]), straight]), Not(Test("at", subject, other))])
 
@@ -561,10 +561,11 @@ class ScenarioResolver(Resolver):
             left = self.value(node.left, self._element(lead, scope), scope)
         else:
             left = self.value(node.left, None, scope)
-        values: list[Term] = []
-        found = any_of(self._among(left, option, node, scope, values) for option in options)
-        if len(options) > 1:  # all are asked for, also those after one that it is
-            found = all_of([*_asked_for(*(one for one in values if one not in self.slot_words)), found])
+        among = [self._among(left, option, node, scope) for option in options]
+        found = any_of(is_it for is_it, _ in among)
+        if len(options) > 1:  # every option has to be found, also those after the one that matches
+            values = [value for _, value in among if value is not None and value not in self.slot_words]
+            found = all_of([*_asked_for(*values), found])
         return _negated(found) if node.negated else found
 
     def _element(self, option: ast.Expr, scope: Scope) -> Type:
@@ -577,19 +578,20 @@ class ScenarioResolver(Resolver):
     def _options(self, node: ast.Expr) -> tuple[ast.Expr, ...]:
         return node.options if isinstance(node, ast.Alternatives) else (node,)
 
-    def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope, values: list[Term]) -> Term:
-        """Whether a value is one option, or one of it; an option that is a value itself is added to `values`."""
+    def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope) -> tuple[Term, Term | None]:
+        """Whether a value is one option, or in it, and the option itself if that is one value."""
         if isinstance(option, ast.Interval):
             left = self.fit(left, INT, option, scope)
-            return between(left, self.value(option.low, INT, scope), self.value(option.high, INT, scope))
+            low, high = (self.value(end, INT, scope) for end in (option.low, option.high))
+            return between(left, low, high), None
         if groups.is_group(self, option, scope):
             group = groups.group(self, option, left.type, scope)
             alike = same_kind(left.type, group.type) and left.type.words == group.type.words
             if not alike or left in self.slot_words:
-                return any_of(self.equal(left, item, node, scope) for item in group.items)
-            return one_of(left, group.items)
-        values.append(self.guess(option, left.type, scope))
-        return self.equal(left, values[-1], option, scope)
+                return any_of(self.equal(left, item, node, scope) for item in group.items), None
+            return one_of(left, group.items), None
+        value = self.guess(option, left.type, scope)
+        return self.equal(left, value, option, scope), value
 
     # -- arithmetic ------------------------------------------------------------------------------------------
 

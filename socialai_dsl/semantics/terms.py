@@ -543,11 +543,8 @@ def may_be_nothing(term: Term) -> bool:
 
 def where_there_is(needed: Term, result: Term) -> Term:
     """A value that follows from another, which is asked for first: of an empty register nothing is found."""
-    return asked_first(needed, result) if may_be_nothing(needed) else result
-
-
-def asked_first(needed: Term, result: Term) -> Term:
-    """A value that is found only where another is, whether it takes that other one or not."""
+    if not may_be_nothing(needed):
+        return result
     never = Compare("<", needed, Const(needed.type, needed.type.low))
     return Select(result.type, (never,), (Const(result.type, result.type.low),), result)
 

@@ -12,8 +12,7 @@ from urllib.parse import quote
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.frontend import SUFFIXES
-from socialai_dsl.loader.reader import MAX_FILE_BYTES, read_source
+from socialai_dsl.loader.reader import MAX_FILE_BYTES, SUFFIXES, read_source
 
 _DRAFTS: Final = ".studio"
 _MOST_FILES: Final = 500
