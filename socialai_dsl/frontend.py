@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment
+from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment, with_scenarios
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.checking.scenarios import (
     check_library,
@@ -324,7 +324,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
         right = None
         if experiment is not None:
             played = _check_played(experiment, bag, files)
-            right = None if bag.has_errors else replace(experiment, played=played)
+            right = None if bag.has_errors else with_scenarios(experiment, played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)

@@ -264,11 +264,11 @@ RECIPES: Final[Mapping[str, Preset]] = {
             "minibatches": 16,
             "lr": 1e-3,
             "lr_end": 1e-4,
-            "entropy_coef_end": 0.002,
-            # Imitation ends with tiny gradients. Remembered for longer, they would make the first steps of PPO, whose
-            # gradients are large, up to six times too long.
+            # The rest keeps what was imitated. Advantages scaled to deviation 1 would be noise where the policy succeeds.
+            "normalize_advantages": False,
+            "entropy_coef": 0.0,
+            # Remembered for longer, imitation's tiny gradients make PPO's first steps up to six times too long.
             "adam_beta2": 0.95,
-            # Imitation leaves a policy that is nearly certain; without a limit PPO unlearns it in a few steps.
             "target_kl": 0.02,
         },
         "docs/mastery.md: behaviour cloning of the scenario's script (Pomerleau 1991), then PPO",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from socialai_dsl.checking.loaded import Loaded, guided_options
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
@@ -17,9 +18,6 @@ from socialai_dsl.semantics.experiment import Cell, cells_of
 from socialai_dsl.source import DataPath
 from trainer.shipped import PREFIX, shipped_agents
 
-if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded
-
 
 @dataclass(frozen=True)
 class LoadedExperiment:
@@ -28,7 +26,7 @@ class LoadedExperiment:
     Attributes:
         experiment: the models. resolved: the data with its positions.
         cells: profile -> its conditions; None is the file without a profile.
-        played: the scenarios, by their names in the file; `frontend` puts them in when it has checked them.
+        played: the scenarios, by their names in the file; see `with_scenarios`.
     """
 
     experiment: Experiment
@@ -92,6 +90,20 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
         _check_agents(own, resolved, bag)
         _check_names(own, resolved, bag)
     return LoadedExperiment(experiment, resolved, cells)
+
+
+def with_scenarios(experiment: LoadedExperiment, played: Mapping[str, Loaded]) -> LoadedExperiment:
+    """The experiment with its scenarios, and with what the recipe `guided` takes from them."""
+
+    def complete(cell: Cell) -> Cell:
+        if not cell.trains or cell.options.get("recipe") != "guided":
+            return cell
+        options = guided_options(played[cell.scenario])
+        frames = options.pop("frames")
+        return replace(cell, frames=cell.frames or frames, options=options | dict(cell.options))
+
+    cells = {profile: tuple(map(complete, own)) for profile, own in experiment.cells.items()}
+    return replace(experiment, played=played, cells=cells)
 
 
 def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticBag) -> None:

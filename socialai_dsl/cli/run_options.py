@@ -226,21 +226,9 @@ def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
     return "guided" if scripted_name(scenario) is not None else "plain"
 
 
-GUIDED_FRAMES: Final = 1_500_000
-GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
-
-
 def usual_for(recipe: str, scenario: str) -> dict[str, Any]:
-    """Defaults that depend on the scenario: its frames, and the curriculum of a suite that draws its members.
-
-    The frames are those that the scenario's file says, measured to be enough (docs/mastery.md).
-    """
+    """Defaults that depend on the recipe and the scenario."""
     import socialai_dsl
+    from socialai_dsl.checking.loaded import guided_options
 
-    if recipe != "guided":
-        return {"frames": PLAIN_FRAMES}
-    loaded = socialai_dsl.load(scenario)
-    if not isinstance(loaded, socialai_dsl.LoadedSuite):
-        return {"frames": loaded.scenario.training_frames or GUIDED_FRAMES}
-    usual: dict[str, Any] = {"frames": loaded.suite.training_frames or GUIDED_FRAMES_OF_A_SUITE}
-    return usual | ({"curriculum": "even"} if loaded.suite.draw == "uniform" else {})
+    return guided_options(socialai_dsl.load(scenario)) if recipe == "guided" else {"frames": PLAIN_FRAMES}

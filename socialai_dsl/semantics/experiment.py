@@ -40,7 +40,7 @@ class Cell:
         name: its own. group: of conditions shown together, if any. row, column: its place in the group's table.
         scenario: with all variants, as it is written in the file, so a path is relative to that.
         agent: `ppo`, `random`, `oracle`, or a path relative to the file.
-        frames: to train for; None: as many as `socialai-run` has by default.
+        frames: to train for; None where nothing is trained, or where the scenario's file says it, see `with_scenarios`.
         seeds: one run for each.
         options: those of `OPTIONS` that are given.
         tests: scenarios played besides, with all variants -> what was found elsewhere.
@@ -297,7 +297,8 @@ class _Expansion:
             return None
         variants = given.get("variants", ())
         agent = given.get("agent", "ppo")
-        if agent == "ppo" and "frames" not in given and not self._lost:
+        guided = given.get("recipe") == "guided"  # its scenario says how many frames, where the file does not
+        if agent == "ppo" and "frames" not in given and not guided and not self._lost:
             message = (
                 f"the condition `{draft.name}` needs a key `frames`: for how long its agents are trained"
             )

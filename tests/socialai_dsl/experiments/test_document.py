@@ -10,8 +10,8 @@ import pytest
 
 from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.experiments.arguments import typed
-from socialai_dsl.experiments.document import differences, document_of
-from socialai_dsl.frontend import load_experiment
+from socialai_dsl.experiments.document import config_of, differences, document_of
+from socialai_dsl.frontend import load, load_experiment
 from socialai_dsl.schema.experiment import NETS, Hyper, Settings
 
 ROOT = Path(__file__).parents[3]
@@ -254,3 +254,25 @@ def test_the_networks_are_those_of_the_trainer():
     from trainer.config import NET_PRESETS
 
     assert set(NETS) == set(nets._SHIPPED) >= set(NET_PRESETS)
+
+
+@pytest.mark.parametrize(
+    ("condition", "frames", "curriculum"),
+    [
+        ("", 1_000_000, "none"),
+        (", frames: 5000", 5000, "none"),
+        (", scenario: social_env", load("social_env").suite.training_frames, "even"),
+        (", scenario: social_env, curriculum: none", load("social_env").suite.training_frames, "none"),
+    ],
+)
+def test_a_guided_condition_takes_from_the_scenario_what_it_does_not_say(
+    tmp_path: Path, condition: str, frames: int, curriculum: str
+) -> None:
+    file = tmp_path / "e.yaml"
+    file.write_text(
+        f"experiment: e\nset: {{scenario: dance, recipe: guided}}\nconditions: [{{name: one{condition}}}]\n"
+    )
+    loaded = load_experiment(file)
+    (cell,) = loaded.cells[None]
+    assert (cell.frames, config_of(cell).frames, config_of(cell).curriculum) == (frames, frames, curriculum)
+    assert document_of(loaded, None)["conditions"][0]["frames"] == frames
