@@ -264,7 +264,7 @@ RECIPES: Final[Mapping[str, Preset]] = {
             "minibatches": 16,
             "lr": 1e-3,
             "lr_end": 1e-4,
-            # The rest keeps what was imitated. Advantages scaled to deviation 1 would be noise where the policy succeeds.
+            # The rest keeps what was imitated. Scaled to deviation 1, advantages are noise where the policy succeeds.
             "normalize_advantages": False,
             "entropy_coef": 0.0,
             # Remembered for longer, imitation's tiny gradients make PPO's first steps up to six times too long.
