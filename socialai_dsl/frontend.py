@@ -29,7 +29,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import SUFFIXES, display_name, read_document
+from socialai_dsl.loader.reader import display_name, read_document, yaml_files_below
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -349,17 +349,11 @@ def _sifted(result: CheckResult) -> CheckResult:
 def check_files(paths: Iterable[str | Path]) -> Iterator[CheckResult]:
     """Check files and every YAML file in folders, each once, in order of their names."""
     seen: set[str] = set()
-    for path in paths:
-        for file in _files(Path(path)):
+    for path in map(Path, paths):
+        for file in yaml_files_below(path) if path.is_dir() else [str(path)]:
             if file not in seen:
                 seen.add(file)
                 yield check(file)
-
-
-def _files(path: Path) -> list[str]:
-    if not path.is_dir():
-        return [str(path)]
-    return sorted(str(file) for file in path.rglob("*") if file.suffix in SUFFIXES and file.is_file())
 
 
 def _checked(resolved: ResolvedFile, bag: DiagnosticBag) -> tuple[CheckedScenario | None, Scenario | None]:

@@ -101,7 +101,7 @@ def unscripted(loaded: Loaded) -> tuple[str, ...]:
     return tuple(name for name, one in members if not any(frame.entity == 0 for frame in one.checked.frames))
 
 
-_GUIDED_FRAMES: Final = 1_500_000
+_GUIDED_FRAMES: Final = 1_000_000
 _GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 

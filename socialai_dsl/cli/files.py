@@ -19,9 +19,9 @@ def yaml_files(folder: str) -> list[str]:
     Raises:
         UsageError: there is none.
     """
-    from socialai_dsl.loader.reader import SUFFIXES
+    from socialai_dsl.loader.reader import yaml_files_below
 
-    names = sorted(str(p) for p in Path(folder).rglob("*") if p.suffix in SUFFIXES and p.is_file())
+    names = yaml_files_below(Path(folder))
     if not names:
         raise UsageError(f"{folder}: expected scenario files (*.yaml) in this folder, found none")
     return names

@@ -740,3 +740,8 @@ def yaml_files(folder: Path) -> list[str]:
         return sorted(name for name in os.listdir(folder) if name.endswith(SUFFIXES))
     except OSError:
         return []
+
+
+def yaml_files_below(folder: Path) -> list[str]:
+    """The paths of the YAML files in a folder and those in it, sorted."""
+    return sorted(str(path) for path in folder.rglob("*") if path.suffix in SUFFIXES and path.is_file())

@@ -424,7 +424,7 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
         Path(f"{name}.yaml").write_text(text)
     usual = {name: usual_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
     assert usual == {
-        "corridor": {"frames": 1_500_000},
+        "corridor": {"frames": 1_000_000},
         "short": {"frames": 4096},
         "pair": {"frames": 8192, "curriculum": "even"},
         "acts": {"frames": 6_000_000},  # nothing is drawn that a curriculum could choose
