@@ -23,7 +23,7 @@ def load() -> float | None:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[int]:
-    """Keep this thread, and those it starts, on `count` cores meanwhile, where the system can; how many there are."""
+    """Keep this thread, and those it starts, on `count` cores, where the system can; how many there are."""
     if not hasattr(os, "sched_setaffinity"):
         yield min(count, os.cpu_count() or 1)
         return

@@ -63,7 +63,7 @@ class Ours:
         yield self._mixture(f"{len(names)} programs in one batch", played, mix, self._seconds)
 
     def rules(self, name: str) -> Iterator[Row]:
-        """Somebody is spoken to, and answers, in nearly every step."""
+        """An NPC is spoken to, and answers, in nearly every step."""
         envs: Any = socialai_dsl.make_vec(name, num_envs=max(self._batches), copy=False)
         if not hasattr(envs.program, "words"):  # a suite; its members are scenarios
             envs.close()

@@ -49,7 +49,7 @@ class Memory:
 
 @dataclass(frozen=True)
 class Wait:
-    """Seconds on the clock that somebody waits for something.
+    """Seconds on the clock that a user waits for something.
 
     Attributes:
         what: for what.

@@ -35,7 +35,7 @@ class RuleHeavy:
 
 
 def rule_heavy_actions(envs: Any, allowed: Allowed, seed: int) -> RuleHeavy:
-    """Actions for environments of one scenario after which somebody speaks, wherever that can be had."""
+    """Actions for environments of one scenario after which an NPC speaks, wherever that can be had."""
     generator, horizon = np.random.default_rng(seed), envs.program.header(Header.HORIZON)
     spoken = _what_rules_wait_for(envs.program, allowed)
     envs.reset(seed=seed)

@@ -137,7 +137,7 @@ class Knowing:
         return RoomKnown(Known.NOTHING_TO_KNOW if step is None else Known.ALL, step or 0)
 
     def _alone(self, other: _Other) -> Verdict:
-        """Whether somebody who knows all of an alternative can solve it."""
+        """Whether a player that knows all of an alternative can solve it."""
         return self._search.solve(*other.start, self._effort.states, self._effort.clock).verdict
 
     def _others(self, room: int) -> list[_Other]:

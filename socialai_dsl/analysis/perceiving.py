@@ -110,7 +110,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> Perceived:
 
 
 def _said(actions: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Actions without the template and noun of who is silent."""
+    """Actions without the template and noun where nothing is said."""
     told = actions.copy()
     told[told[:, 1] == 0, 1:] = 0
     return told

@@ -204,7 +204,7 @@ def _choices(blocks: list[list[Instruction]]) -> tuple[tuple[int, int], ...] | N
 
 
 def _draws_matter(program: Program, block: list[Instruction]) -> bool:
-    """Whether chance decides anything there but which line is said, to somebody for whom lines are only words."""
+    """Whether chance decides anything there but which line is said, where lines are only words to their hearer."""
     if any(op in _CHANCY for op, _ in block):
         return True
     selected = _selected(block)

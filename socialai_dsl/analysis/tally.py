@@ -66,7 +66,7 @@ def tally(
             `choose` is asked.
         episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
         seed: of the environments.
-        clock: when to stop early, and who is told how far it is.
+        clock: when to stop early, and where progress is reported.
     """
     watch, ended = _Watch(envs, scenarios), 0
     with clock.until_interrupted():

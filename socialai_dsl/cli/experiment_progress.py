@@ -83,7 +83,7 @@ class RunsProgress:
             print(f"{self._sum(len(at_work))}; at work: {runs}{more}", file=self._stream, flush=True)
 
     def _at_work(self) -> "list[tuple[Run, float, float | None]]":
-        """Runs that somebody works on, here or elsewhere: how far each is, and its last frames per second."""
+        """Runs that a process works on, here or elsewhere: how far each is, and its last frames per second."""
         found = []
         for run in self._left.values():
             if run.shown_status().state != "running":

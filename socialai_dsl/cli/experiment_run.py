@@ -82,7 +82,7 @@ def work_on(
     """Work on the runs that are left, and report their results.
 
     Raises:
-        KeyboardInterrupt: somebody stopped it; all runs are left so that the same command goes on with them.
+        KeyboardInterrupt: it was interrupted; all runs are left so that the same command goes on with them.
     """
     outcomes: Counter[str] = Counter()
     # With --json, standard output belongs to the result alone.

@@ -210,7 +210,7 @@ def _plain_value(name: str, written: str) -> bool | int | float | str | None:
 
 
 def automatic_threads() -> int:
-    """Threads where nobody says how many."""
+    """Threads where the command does not say how many."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(cores, _MOST_THREADS))
 

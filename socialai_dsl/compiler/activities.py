@@ -298,7 +298,7 @@ class Activities:
         self.to.sited_condition(Sited(activity.args[0], activity.site, activity.span), otherwise)
 
     def _enter(self, activity: Activity) -> None:
-        """Use it while it cannot be walked on, then go there; who is there stays there."""
+        """Use it while it cannot be walked on, then go there; a member that is there stays."""
         block = self.to.block
         entity = self._aimed_at(activity)
         shut, done = Label(), Label()

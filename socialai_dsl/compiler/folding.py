@@ -42,7 +42,7 @@ class Classes:
         sequence; empty where nobody performs one.
         speakers_matter: whether a rule asks who said something, or what stood in its slots.
         sets: sets of classes that a rule waits for and wants to know more about.
-        said: for each NPC and pattern that somebody asks about, the lines of that NPC that fit it.
+        said: for each NPC and pattern that a condition asks about, the lines of that NPC that fit it.
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
@@ -83,7 +83,7 @@ class Classes:
         return self._numbers.setdefault(signature, len(self._numbers) + 1)
 
     def of_text(self, text: str, to: int | None = None) -> int:
-        """Class of what an NPC says, perhaps to somebody."""
+        """Class of what an NPC says, perhaps to a single hearer."""
         return self._number(self._addressees.joined(self._of_text(text), to))
 
     def _of_text(self, text: str) -> frozenset[int]:

@@ -59,7 +59,7 @@ def out_of_hands(to: Expressions, term: Term, entity: int) -> None:
 
 
 def move_into(to: Expressions, term: Term, thing: int, holder: Term, into: int) -> None:
-    """A thing, `term`, lies in an object from now on, or is in somebody's hands if these are empty."""
+    """A thing, `term`, lies in an object from now on, or is in a member's hands if these are empty."""
     if is_member(to.checked, holder):
         into_hands(to, thing, into)
         return

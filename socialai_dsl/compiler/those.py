@@ -12,7 +12,7 @@ from socialai_dsl.semantics.plans import Assignment, Effect, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Sited, Term
 
 _BITS = 15
-"""So many bits stand in one operand, which a register of 16 bits can keep until a body action is done."""
+"""Bits that stand in one operand, which a register of 16 bits can keep until a body action is done."""
 
 
 def conditions(what: RulePlan | StepPlan) -> list[Sited]:
@@ -34,7 +34,7 @@ def _bit(bits: tuple[int, ...], number: int) -> tuple[int, int]:
 
 
 class Chosen:
-    """Emits, before anything is done, who is one of those, and what only they need.
+    """Emits, before anything is done, which members are among those, and what only they need.
 
     Attributes:
         bits: operands with the bits, `_BITS` in each.

@@ -42,7 +42,7 @@ def pick_up(row: Row, who: int) -> None:
 
 @outline
 def put_down(row: Row, who: int) -> None:
-    """Give what is carried to who stands ahead, if that one takes it, or lay it there, if something can roll there."""
+    """Give what is carried to the member ahead, if it takes it, or lay it there, if something can roll there."""
     stay_outline()
     thing = carried_by(row, who)
     if thing == 0:

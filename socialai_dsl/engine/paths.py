@@ -28,8 +28,8 @@ _KEPT = np.int64(2)
 def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
     """Direction of the next cell of a shortest path to the cell of `target`, or to a free cell `beside` it.
 
-    NO_PATH if there is none, and also for who is there already. `preferred` chooses among equally good cells. The
-    target may be a cell itself.
+    NO_PATH if there is none, or if the mover is there already. `preferred` chooses among equally good cells. The target
+    may be a cell itself.
     """
     stay_outline()
     if mover >= NO_CELL or not (is_present(row, mover) and is_somewhere(row, target)):
@@ -133,7 +133,7 @@ def explore(row: Row, mover: int, turn: int) -> int:
 
 @inline
 def _walks(row: Row, mover: int, direction: int, cells: int) -> bool:
-    """Whether so many cells in a direction are floor that a mover could walk on now."""
+    """Whether the next `cells` cells in a direction are floor that a mover could walk on now."""
     height = row.program[Header.CANVAS_HEIGHT]
     floor = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
     for k in range(1, cells + 1):

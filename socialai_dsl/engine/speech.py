@@ -154,7 +154,7 @@ def is_in_inbox(row: Row, utterance: int, inbox: int) -> bool:
 def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
     """The speaker (part 1) or noun (part 2) of an entry whose class is in a set of classes; -1 if there is none.
 
-    Of several it is that of the agent, then of who comes first in the cast, whenever they spoke.
+    Of several it is that of the agent, then of the member that comes first in the cast, whenever they spoke.
     """
     known = row.program[Header.CLASS_SET_AT] + row.program[Header.CLASS_SET_WORDS] * classes
     found = NOTHING
@@ -170,7 +170,7 @@ def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
 
 @inline
 def _agent_may_hear(row: Row, speaker: int) -> bool:
-    """Whether the agent hears an NPC at all: not while NPCs are hidden, but for who is always audible."""
+    """Whether the agent hears an NPC at all: not while NPCs are hidden, unless the NPC is always audible."""
     return not npcs_are_hidden(row) or column(row, speaker, EntityColumn.AUDIBLE) == 1
 
 

@@ -71,7 +71,7 @@ Cell = tuple[int, int]
 
 _STEPS: Final = ((0, 1), (0, -1), (1, 0), (-1, 0))
 _FREE, _BODY, _THING = 1, 1_000, 100_000
-"""What a step costs: a way round is better than one through somebody, and that than one through something."""
+"""What a step costs: a way round is better than one through a member of the cast, and that than one through a thing."""
 _AGENT: Final = 0
 
 

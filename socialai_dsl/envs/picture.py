@@ -157,7 +157,7 @@ def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
 
 
 def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int, int], Code]:
-    """(x, y) -> what is in the hands of who stands there: of NPCs its type and colour, where the agent sees them."""
+    """(x, y) -> what is in the hands of the member there: of NPCs its type and colour, where the agent sees them."""
     program, registers = table.program(row), table.state.registers[row]
     flags = program.header(Header.FLAGS)
     if not flags & Flag.CARRYING:

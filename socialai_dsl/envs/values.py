@@ -110,7 +110,7 @@ NOTHING = "none"
 """What is in a register that may hold nothing, when it does."""
 
 SILENCE = ""
-"""The utterance of who says nothing."""
+"""The utterance that stands for silence."""
 
 
 def entry_words(program: Program) -> int:

@@ -1,4 +1,4 @@
-"""Who plays: random actions, a script, a person, a language model or a trained network."""
+"""Players: random actions, a script, a person, a language model or a trained network."""
 
 import re
 import warnings

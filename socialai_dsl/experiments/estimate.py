@@ -69,7 +69,7 @@ class Speeds:
         return str(condition["options"]["net"]) in self._by_net
 
     def look_again(self) -> None:
-        """Take note of what was measured meanwhile."""
+        """Take note of what was measured in the meantime."""
         self._cached = _cached()
 
     def remaining(self, run: Run) -> float | None:

@@ -112,7 +112,7 @@ class Run:
         return Status(content["state"], content.get("attempts", []), content.get("message"))
 
     def write_status(self, status: Status) -> None:
-        """Replace the status; by who holds the lock alone.
+        """Replace the status; only the holder of the lock may.
 
         Raises:
             OSError: it cannot be written.
@@ -216,7 +216,7 @@ class Run:
         return max(times, default=None)
 
     def is_cancelled(self) -> bool:
-        """Whether somebody wants it to be given up."""
+        """Whether it is asked to be given up."""
         return (self.path / CANCEL).exists()
 
 

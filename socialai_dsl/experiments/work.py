@@ -45,7 +45,7 @@ class Outcome(StrEnum):
     FAILED = "failed"
     CANCELLED = "cancelled"
     STOPPED = "stopped"
-    HELD = "held"  # somebody else works on it
+    HELD = "held"  # another process works on it
 
 
 End = tuple[Outcome, str]
@@ -107,20 +107,20 @@ def finished(run: Run) -> End | None:
 
 
 def cancel(run: Run) -> None:
-    """Give a run up: at once if nobody works on it, else within a second by the worker."""
+    """Give a run up: at once if no process works on it, else within a second by the worker."""
     run.path.mkdir(parents=True, exist_ok=True)
     (run.path / CANCEL).touch()
     _settle(run, "cancelled")
 
 
 def retry(run: Run) -> bool:
-    """Let a run that failed or was cancelled wait again; False if somebody works on it."""
+    """Let a run that failed or was cancelled wait again; False if a process works on it."""
     (run.path / CANCEL).unlink(missing_ok=True)
     return _settle(run, "waiting")
 
 
 def _settle(run: Run, state: State) -> bool:
-    """Change the state of a run that nobody works on; whether that was so."""
+    """Change the state of a run that no process works on; whether that was so."""
     try:
         with run.lock():
             try:
@@ -146,7 +146,7 @@ def _performed_alone(run: Run, stop: Stop) -> End:
 
 
 class _Work:
-    """Work on one run, by the one who holds its lock."""
+    """Work on one run; the caller holds its lock."""
 
     def __init__(self, run: Run, stop: Stop) -> None:
         self._run = run

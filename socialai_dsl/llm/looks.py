@@ -159,7 +159,7 @@ def _beside_it(right: int, nearer: int) -> str:
 
 
 def steps(count: int) -> str:
-    """So many steps."""
+    """A number of steps in words."""
     return "1 step" if count == 1 else f"{count} steps"
 
 

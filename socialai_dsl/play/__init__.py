@@ -14,7 +14,7 @@ __all__ = ["play"]
 
 
 def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[Played]":
-    """Let somebody at the terminal play; the episodes that were played to their end.
+    """Let a person at the terminal play; the episodes that were played to their end.
 
     Args:
         scenario: a path or a name.

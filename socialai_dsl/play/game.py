@@ -19,7 +19,7 @@ from socialai_dsl.replay.steps import describe_step
 from socialai_dsl.vocabulary import DIRECTIONS, spelt
 
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
-"""What `describe` says of somebody that is shown otherwise, or only counts."""
+"""What `describe` says of a member that is shown otherwise, or only counts."""
 
 
 @dataclass(frozen=True)

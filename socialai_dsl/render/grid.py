@@ -40,7 +40,7 @@ def draw_grid(
         agent: (x, y, direction); x to the right, y down, direction 0 right, 1 down, 2 left, 3 up.
         seen: bool (H, W), the cells in the agent's field of view, tinted and outlined; None marks nothing.
         tile: side of a cell in pixels.
-        below: (x, y) -> what lies under the one who stands there, such as a doorway.
+        below: (x, y) -> what lies under the member there, such as a doorway.
         gestures: (x, y) -> where the NPC there points and what it did last.
         held: (x, y) -> what the agent or the NPC there carries.
         marks: (x, y) -> the looks of what is seen there; where the agent stands, of what it carries.

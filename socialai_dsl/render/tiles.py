@@ -58,7 +58,7 @@ def draw_tile(
         size: side of the tile in pixels.
         below: what lies under it, such as the doorway in which an NPC stands; None for plain floor.
         gesture: where an NPC points and what it did last; None where that is not shown.
-        held: what who stands here carries; None for nothing.
+        held: what the member here carries; None for nothing.
         marks: the looks of what is here; where the agent stands, of what it carries.
         rays: from NPCs to cells that they point at, as seen from this cell.
 

@@ -58,8 +58,8 @@ class Run:
 
     Attributes:
         id, seed: which. folder: where it lies.
-        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it runs and nobody works
-            on it; `missing` where there is no folder.
+        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it runs and no process
+            works on it; `missing` where there is no folder.
         message: what its status says. attempts: how often it was begun, as far as known.
         result: of a finished run. rooms: success by number of the test episode, where the run lists its episodes.
         tests: scenario -> figures of its further tests.

@@ -43,7 +43,7 @@ _Text = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 # The loader makes texts of plain numbers, `true` and `null` where a text is expected.
 _Null = Annotated[None, WithJsonSchema({"enum": [None]})]
 TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null)]
-"""A text that somebody can say, possibly with <...> parts."""
+"""A text that the agent or an NPC can say, possibly with <...> parts."""
 
 Prose = Annotated[str, as_written(str | float | bool)]
 """A text for people."""

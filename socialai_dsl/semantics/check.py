@@ -588,7 +588,7 @@ class _Run:
                 yield object_facts.watching(member, number, span)
 
     def _look_at_unused(self) -> None:
-        """Frames that nobody plays are checked as if somebody did, so that no mistake waits for its first use."""
+        """Frames that no member plays are checked as if one did, so that no mistake waits for its first use."""
         played = {frame.name for frame in self._played.values()}
         npcs = [name for name in self._symbols.cast if name != AGENT]
         # `it` means something only to one of a group, so such a member looks at what nobody plays.

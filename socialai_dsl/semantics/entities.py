@@ -135,7 +135,7 @@ def _check_files(scenario: Scenario, findings: Findings) -> None:
 
 
 def _roles(scenario: Scenario, findings: Findings) -> dict[str, str]:
-    """Role -> who plays it; reports roles that do not exist or are played twice."""
+    """Role -> the member that plays it; reports roles that do not exist or are played twice."""
     played: dict[str, str] = {}
     for name, member in scenario.cast.items():
         role = member.role

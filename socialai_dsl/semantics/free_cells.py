@@ -1,7 +1,7 @@
 """Placements that may find no free cell, in all rooms of a size or in drawn ones.
 
 In drawn rooms, what cannot be told without the engine, such as what can be reached, counts as favourable, so that
-somebody who is found missing really is.
+a member that is found missing really is.
 """
 
 from __future__ import annotations
@@ -457,7 +457,7 @@ def _taken_away(term: Term) -> int:
     raise UnknownError
 
 
-# -- drawn rooms: who is missing without being asked to be ---------------------------------------------------
+# -- drawn rooms: members and things that are missing against the author's intention ------------------------
 
 
 _ROOMS: Final = 100
@@ -490,7 +490,7 @@ def check_absences(checked: CheckedScenario, findings: Findings, undecided: Coll
         if absent == found.rooms:
             hint = "its `where` never holds there; widen its place, or the room"
             findings.error("S601", f"`{key}` has no free cell in any room", placing.span, hint=hint)
-        elif not checked.require:  # rooms that miss somebody may be among those that are drawn again
+        elif not checked.require:  # rooms that miss a member may be among those that are drawn again
             message = (
                 f"`{key}` has no free cell, and so is absent, in {_percent(absent / found.rooms)} of rooms"
             )

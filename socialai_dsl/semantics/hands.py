@@ -1,4 +1,4 @@
-"""What can be carried, and what is asked of hands: `carries`, `carried`, `empty_handed`, and who can be given what."""
+"""What can be carried, and what is asked of hands: `carries`, `carried`, `empty_handed`, and receivers."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def check_carried(resolver: Resolver, thing: Term, node: ast.Expr, scope: Scope)
 
 
 def empty_handed(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    """Whether somebody carries nothing."""
+    """Whether a member carries nothing."""
     _check_hands(resolver, who, node, scope)
     things = map(entity, carryable(resolver))
     return all_of([Not(_in_hands(resolver, who, thing)) for thing in things])
@@ -87,7 +87,7 @@ def _check_hands(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) ->
 
 
 def _in_hands(resolver: Resolver, who: Term, thing: Term) -> Term:
-    """Whether somebody carries a thing: its register holds 0, or 1 + who carries it."""
+    """Whether a thing is carried: its register holds 0, or 1 + the number of its carrier."""
     members = len(resolver.symbols.numbers)
     by = arithmetic("+", as_number(who), number(1))
     return Compare("==", FieldOf(Type("int", 0, members), thing, "carrier"), by)

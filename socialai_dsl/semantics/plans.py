@@ -236,7 +236,7 @@ class FramePlan:
     states: tuple[StatePlan, ...] = ()
     steps: tuple[StepPlan, ...] = ()
     written: bool = True
-    """False: nobody wrote it; it is there for who only believes something."""
+    """False: the file does not have it; it serves members whose beliefs may be wrong."""
     nesting: tuple[int | NestedSteps, ...] | None = None
     """Where some entries of `steps` are nested: their numbers in order, without those that never begin."""
 

@@ -484,7 +484,7 @@ class Possible:
 
     def _may_compare(self, term: terms.Compare, wanted: bool) -> bool:
         if any(is_own_noun(side) or may_be_nothing(side) for side in (term.left, term.right)):
-            return True  # whoever is silent names no noun, and a register may hold nothing
+            return True  # a silent member names no noun, and a register may hold nothing
         op, left, right = term.op, term.left, term.right
         a, b = self._values(left), self._values(right)
         if not a or not b:

@@ -250,7 +250,7 @@ def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast
 
 
 def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, scope: Scope) -> Term:
-    """What two look at, what somebody points at, who toggled at something."""
+    """What two members look at, what one points at, the one that toggled at something."""
     first, *rest = node.args
     if name == "toggled_by":
         check_toggled(resolver, name, subject, node, scope)
@@ -362,7 +362,7 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
 
 
 def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
-    """`any(p in peers where p.is(ready))`, `leader.is(ready)`: of whoever is meant."""
+    """`any(p in peers where p.is(ready))`, `leader.is(ready)`: of the member that is meant."""
     members = resolver.symbols.members_of(who.type.values)
     named = [member for member in members if member is not None]
     if len(named) < len(members):

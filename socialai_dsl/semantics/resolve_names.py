@@ -427,7 +427,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
 
 
 def _player(resolver: Resolver, role: str) -> str:
-    """Who plays a role that is spoken of."""
+    """The member that plays a role."""
     symbols = resolver.symbols
     if role in symbols.roles:
         return symbols.roles[role]
@@ -609,7 +609,7 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
                 return single(resolver, register, None, node, scope)
             if played is not None and played.model.slots.get(node.name) == "bool":
                 return member_truth(resolver, played, node.name, scope)
-        # Of somebody unknown nobody can say what they have.
+        # Nothing is known of the attributes of an unknown member.
         known = node.name in VALUES or node.name in _statuses(resolver)
         if not known and resolver.means_nothing(node.subject.id, scope):
             raise _unknown(resolver, node.subject, None, scope)

@@ -514,7 +514,7 @@ class Resolver(ABC):
         used: where the definitions and draws stand that something uses.
         missing_keys: table and word of what may be looked up and is not there, once it has been reported.
         slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
-        addresses: whether the agent or an NPC addresses somebody.
+        addresses: whether the agent or an NPC addresses a single hearer.
     """
 
     def __init__(

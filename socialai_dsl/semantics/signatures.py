@@ -45,7 +45,7 @@ class Signature:
         momentary: it speaks of the current step, so it means nothing before the first.
         cell: `here` may be its subject as well.
         optional: how many of the last arguments may be left out.
-        moves: of an activity, what becomes of who does it.
+        moves: of an activity, what becomes of the member that does it.
         endless: an activity that never ends by itself, so that a step of it says how long it lasts.
     """
 
@@ -131,7 +131,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("inside", "object", (), "object", "what it lies in, or lay in last"),
     _value("carried", "member", (), "object", "what it carries", momentary=True),
     _value("pointing", "member", (), "condition", "it points somewhere", momentary=True),
-    _value("toggled", "object", (), "condition", "somebody toggled at it in this step", momentary=True),
+    _value("toggled", "object", (), "condition", "a member of the cast toggled at it in this step", momentary=True),
     _value("unlocked_by", "object", (), "object", "what unlocks it"),
     # measures
     _value("distance", "entity", ("entity",), "number", "Manhattan distance"),
@@ -168,7 +168,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _activity("forward", (), "one cell ahead"),
     _activity("toggle", (), "use what is ahead", moves="stays"),
     _activity("pickup", (), "take what is ahead into its hands", moves="stays"),
-    _activity("drop", (), "lay down ahead what it carries, or give it to who stands there", moves="stays"),
+    _activity("drop", (), "lay down ahead what it carries, or give it to the member that stands there", moves="stays"),
     _activity("face", ("entity",), "turn towards x, a quarter turn a step", moves="turns", endless=True),
     _activity("turn_to", ("direction",), "turn to a direction, a quarter turn a step", moves="turns"),
     _activity("turn", ("turn",), "a quarter turn left or right", moves="turns"),

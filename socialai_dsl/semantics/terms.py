@@ -660,7 +660,7 @@ def draws(term: Term) -> bool:
 
 
 def may_find_nothing(term: Term) -> bool:
-    """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent.
+    """Whether a term may need one of a group when none is what is wanted, or the noun of a member that is silent.
 
     What `prev` noted may have found nothing then, and a register may hold nothing.
     """

@@ -38,7 +38,7 @@ class RefusalError(ValueError):
 
 @dataclass
 class _Before:
-    """What is put back with a step: the environment, and the chance of who plays."""
+    """What is put back with a step: the environment, and the player's chance."""
 
     snapshot: bytes
     observation: Mapping[str, NDArray[Any]]
@@ -231,7 +231,7 @@ class Session:
         self._player, self._policy, self._moments = "me", None, []
 
     def _choose(self, player: str) -> None:
-        """Let somebody else play."""
+        """Hand the play to another player."""
         path = str(self._path)
         loaded = load(path, self._texts)
         if player == "script" and unscripted(loaded):

@@ -24,7 +24,7 @@ class Engine(Protocol):
         """Have `work.perform` called for each of these runs, as soon as there is room."""
 
     def stop(self) -> None:
-        """Leave all runs as they stand, and return when nobody works on them any more."""
+        """Leave all runs as they stand, and return when no process works on them any more."""
 
 
 class MissingEngineError(Exception):
