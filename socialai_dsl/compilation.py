@@ -8,7 +8,7 @@ from typing import overload
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.lowering import NO_NOTES, NoteTaker, allocate, lower
-from socialai_dsl.compiler.notes import Note, NotingProgram, Part, Recorder, Value
+from socialai_dsl.compiler.notes import ConditionPart, Note, NotingProgram, Recorder, Value
 from socialai_dsl.compiler.questions import Asking, ProbeNotes, notes_of
 from socialai_dsl.compiler.questions import Text as NotedText
 from socialai_dsl.compiler.tables import Tables, verify
@@ -17,10 +17,10 @@ from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import CheckedScenario
 
 __all__ = [
+    "ConditionPart",
     "Note",
     "NotedText",
     "NotingProgram",
-    "Part",
     "ProbeNotes",
     "Value",
     "compile_asking",

@@ -70,7 +70,7 @@ class Ignore:
 
 
 @dataclass(frozen=True)
-class Sifted:
+class SiftedFindings:
     """Findings, divided by what comments say.
 
     Attributes:
@@ -82,7 +82,7 @@ class Sifted:
     used: frozenset[Span]
 
 
-def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str | None) -> Sifted:
+def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str | None) -> SiftedFindings:
     """Take out the warnings that comments ignore.
 
     Args:
@@ -94,7 +94,7 @@ def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str
     found = tuple(found)
     ignores = [ignore for source in sources.values() for ignore in ignores_in(source)]
     if not ignores:
-        return Sifted(found, frozenset())
+        return SiftedFindings(found, frozenset())
     warned = {_key(d) for d in found if d.severity is Severity.WARNING}
     used = [i for i in ignores if i.code in _WARNINGS and i.key in warned]
     silenced = {ignore.key for ignore in used}
@@ -105,7 +105,7 @@ def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str
         elif ignore.span.file == judged and ignore not in used:
             message = f"nothing on this line is warned of with `{ignore.code}`; delete the comment"
             bag.warning(UNUSED, message, ignore.span)
-    return Sifted(tuple(bag), frozenset(ignore.span for ignore in used))
+    return SiftedFindings(tuple(bag), frozenset(ignore.span for ignore in used))
 
 
 def ignores_in(source: Source) -> Iterator[Ignore]:

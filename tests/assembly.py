@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from socialai_dsl import draws
-from socialai_dsl.engine.batch import Batch, Part
+from socialai_dsl.engine.batch import Batch, LinkedProgram
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import (
@@ -383,9 +383,9 @@ class Assembly:
 HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
-def part_of(program: Program) -> Part:
+def part_of(program: Program) -> LinkedProgram:
     """A program with its links into a batch of programs like it."""
-    return Part(
+    return LinkedProgram(
         words=program.words,
         rules=len(program.rules),
         outcomes=range(len(program.outcome_table)),

@@ -66,7 +66,7 @@ def any_color(item: Any) -> Any:
 
 def liar_may_be_right(rule: RulePlan) -> RulePlan:
     def open_up(part: Any) -> Any:
-        if isinstance(part, terms.FieldOf) and isinstance(part.entity, terms.Quantified):
+        if isinstance(part, terms.FieldOf) and isinstance(part.entity, terms.Quantification):
             return replace(part, entity=replace(part.entity, condition=None))
         return part
 

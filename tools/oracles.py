@@ -11,7 +11,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.cli.terminal import ProgressLine
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.scripts import UNPROVEN, VERDICTS, Room, ScriptReport, play_script
+from socialai_dsl.evaluation.scripts import UNPROVEN, VERDICTS, ScriptReport, UnsolvedRoom, play_script
 from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
 from socialai_dsl.run_folder import write_text
 
@@ -99,7 +99,7 @@ def _page(reports: list[ScriptReport], states: int) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _row(room: Room) -> str:
+def _row(room: UnsolvedRoom) -> str:
     verdict = room.verdict if room.exact or room.verdict != "unsolvable" else room.verdict + UNPROVEN
     steps = "" if room.steps is None else f"{room.steps} steps"
     return f"| {room.index} | {room.outcome} | {verdict} | {room.states:,} | {steps} |"

@@ -40,7 +40,7 @@ import torch
 import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.export import Moved, finished_agent, write_agent
+from socialai_dsl.evaluation.export import MovedScenario, finished_agent, write_agent
 from socialai_dsl.evaluation.players import Player
 from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent
 from socialai_dsl.run_folder import RESULT, read_json, write_text
@@ -114,7 +114,7 @@ def shipped_name(loaded: Any, scenario: str) -> str:
     Raises:
         Refused: the scenario does not ship, or is a variant by name or parameters.
     """
-    moved = Moved.of(loaded, scenario)
+    moved = MovedScenario.of(loaded, scenario)
     if moved.texts or set("+?") & set(moved.scenario):
         raise Refused(f"{scenario}: expected the plain name of a scenario that ships")
     return moved.scenario

@@ -29,7 +29,7 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.redrawn import redrawn, sites_of
 from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.analysis.rooms import Start, start_in
-from socialai_dsl.analysis.search import Search, Verdict
+from socialai_dsl.analysis.search import Search, SearchVerdict
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
@@ -101,7 +101,7 @@ def _plans(twins: _Twins, search: Search, learnt: int, effort: Effort) -> list[N
         if not left:
             break
         finding = search.solve(*twins.start_of(left[0]), effort.states, effort.clock)
-        gave_up |= finding.verdict is Verdict.UNDECIDED
+        gave_up |= finding.verdict is SearchVerdict.UNDECIDED
         wins = np.zeros(len(twins), np.bool_) if finding.plan is None else twins.play(finding.plan)
         if wins.any():
             found.append(wins)

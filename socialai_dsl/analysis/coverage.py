@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.search import Search
-from socialai_dsl.analysis.search import Verdict as Searched
+from socialai_dsl.analysis.search import Search, SearchVerdict
 from socialai_dsl.analysis.twins import random_actions
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
@@ -26,7 +25,7 @@ _STEPS: Final = 200
 
 
 @dataclass(frozen=True)
-class Part:
+class CoverageItem:
     """A state, a rule or an outcome.
 
     Attributes:
@@ -48,7 +47,7 @@ class Coverage:
     """
 
     parts: int
-    missing: tuple[Part, ...]
+    missing: tuple[CoverageItem, ...]
     proven: bool
 
 
@@ -99,31 +98,31 @@ _Key = tuple[str, int] | str
 """What tells that a part has happened: a register of a frame with the number of the state, or a counter."""
 
 
-def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, Part]]:
+def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, CoverageItem]]:
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
             if step.duration == 0:  # it is left out
                 continue
             in_a_row = frame.in_a_row or step.duration == FOR_EVER
             key: _Key = (f"{frame.member}.frame", number) if in_a_row else f"rules {step.name}"
-            yield key, Part("step", step.name, step.span)
+            yield key, CoverageItem("step", step.name, step.span)
         for number, state in enumerate(frame.states):
             name = f"{frame.member}.{frame.frame}.{state.name}"
-            yield (f"{frame.member}.frame", number), Part("state", name, state.span)
+            yield (f"{frame.member}.frame", number), CoverageItem("state", name, state.span)
     for rule in (*(rule for frame in checked.frames for rule in frame.rules), *checked.rules):
-        yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
+        yield f"rules {rule.name}", CoverageItem("rule", rule.name, rule.span)
     for outcome in checked.outcomes:
-        yield f"outcomes {outcome.name}", Part("outcome", outcome.name, outcome.condition.span)
+        yield f"outcomes {outcome.name}", CoverageItem("outcome", outcome.name, outcome.condition.span)
 
 
-def _missing(parts: list[tuple[_Key, Part]], seen: _Seen) -> list[Part]:
+def _missing(parts: list[tuple[_Key, CoverageItem]], seen: _Seen) -> list[CoverageItem]:
     """What has not happened; what several members have in common has happened if it did with one of them."""
     happened = {part.span for key, part in parts if _has_happened(key, part, seen)}
     missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
     return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
 
 
-def _has_happened(key: _Key, part: Part, seen: _Seen) -> bool:
+def _has_happened(key: _Key, part: CoverageItem, seen: _Seen) -> bool:
     if isinstance(key, str):
         return key in seen.names
     states = seen.states.get(key[0], set())
@@ -154,7 +153,7 @@ def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
     watching.count(table.counters())
 
 
-def _search(program: Program, parts: list[tuple[_Key, Part]], seen: _Seen, effort: Effort) -> bool:
+def _search(program: Program, parts: list[tuple[_Key, CoverageItem]], seen: _Seen, effort: Effort) -> bool:
     """Go through all that can be done in room after room; whether nothing was left out."""
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
@@ -164,7 +163,7 @@ def _search(program: Program, parts: list[tuple[_Key, Part]], seen: _Seen, effor
         start = state.registers[row], state.boards[row], state.keys[row]
         finding = search.solve(*start, effort.states, effort.clock)
         seen.count(search.counters())
-        return finding.verdict is Searched.UNSOLVABLE and finding.exact
+        return finding.verdict is SearchVerdict.UNSOLVABLE and finding.exact
 
     ends = []
     for ended in effort.each_room("whether everything can happen", find, bool):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from socialai_dsl.analysis.alone import Alone, success_alone
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.properties import Trial
-from socialai_dsl.analysis.search import Finding, Verdict
+from socialai_dsl.analysis.search import Finding, SearchVerdict
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 
@@ -43,8 +43,8 @@ def depth(trial: Trial, effort: Effort) -> Depth:
     return Depth(
         len(findings),
         tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
-        _rooms(findings, Verdict.UNSOLVABLE),
-        _rooms(findings, Verdict.UNDECIDED),
+        _rooms(findings, SearchVerdict.UNSOLVABLE),
+        _rooms(findings, SearchVerdict.UNDECIDED),
         unsolved,
         without_npcs(trial.loaded, effort),
     )
@@ -58,5 +58,5 @@ def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
     return success_alone(compile_loaded(hidden), effort)
 
 
-def _rooms(findings: Sequence[Finding], verdict: Verdict) -> tuple[int, ...]:
+def _rooms(findings: Sequence[Finding], verdict: SearchVerdict) -> tuple[int, ...]:
     return tuple(room for room, finding in enumerate(findings) if finding.verdict is verdict)

@@ -22,11 +22,11 @@ from socialai_dsl.analysis.search import (
     Chances,
     RandomActions,
     Search,
+    SearchVerdict,
     digests_of,
     multipliers,
     useful_actions,
 )
-from socialai_dsl.analysis.search import Verdict as Searched
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
@@ -49,7 +49,7 @@ Plan = Sequence[NDArray[np.int64]]
 """Actions, int64 (3 + slots,) each, one after the other."""
 
 
-class Answer(Enum):
+class GuessingVerdict(Enum):
     """Whether a policy does better than a guess."""
 
     GUESSES = "guesses"  # no policy solves more of the rooms than a guess does
@@ -70,7 +70,7 @@ class Guess:
         step: after which they are known; of a guess that after which the rooms look different when it is too late.
     """
 
-    answer: Answer
+    answer: GuessingVerdict
     states: int
     exact: bool
     step: int | None = None
@@ -117,7 +117,7 @@ class Guessing:
         self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
         self._table.reset(0, None)
         self._alone = Search(program)
-        self._solvable: dict[tuple[int, bytes], Searched] = {}
+        self._solvable: dict[tuple[int, bytes], SearchVerdict] = {}
         self._wins = wins_of(program)
         self._heard = slice(
             program.header(Header.HEARD), program.header(Header.HEARD) + program.header(Header.HEARD_SIZE)
@@ -146,7 +146,7 @@ class Guessing:
             return known
         few = _NEAR * len(self._useful) // len(self._actions)
         near = self._searched(start, min(few, effort.states))
-        if near.answer is not Answer.UNDECIDED or effort.states <= few:
+        if near.answer is not GuessingVerdict.UNDECIDED or effort.states <= few:
             return near
         return self._walked(start, (), _WALKS) or self._searched(start, effort.states)
 
@@ -208,23 +208,23 @@ class Guessing:
             for first in range(0, len(layer), self._at_once):
                 reached, alike = self._step(layer.part(slice(first, first + self._at_once)))
                 if (reached.won > self._level).any():
-                    return Guess(Answer.KNOWS, len(self._seen), True, step)
+                    return Guess(GuessingVerdict.KNOWS, len(self._seen), True, step)
                 hopeful = reached.won + reached.going @ self._weights > self._level
                 following.append(reached.part(self._new(reached, hopeful & alike)))
                 if late is None and (~alike).any():
                     late = step
                 known = self._may_know(reached.part(np.flatnonzero(hopeful & ~alike)), states)
-                if known is Searched.SOLVABLE:
-                    return Guess(Answer.TELLS_APART, len(self._seen), True, step)
-                perhaps = perhaps or (step if known is Searched.UNDECIDED else None)
+                if known is SearchVerdict.SOLVABLE:
+                    return Guess(GuessingVerdict.TELLS_APART, len(self._seen), True, step)
+                perhaps = perhaps or (step if known is SearchVerdict.UNDECIDED else None)
                 if perhaps is not None and not self._surely:
-                    return Guess(Answer.TELLS_APART, len(self._seen), False, perhaps)
+                    return Guess(GuessingVerdict.TELLS_APART, len(self._seen), False, perhaps)
                 if len(self._seen) > states or clock.is_over:
-                    return Guess(Answer.UNDECIDED, len(self._seen), False)
+                    return Guess(GuessingVerdict.UNDECIDED, len(self._seen), False)
             layer = _joined(following)
         if perhaps is not None:
-            return Guess(Answer.TELLS_APART, len(self._seen), False, perhaps)
-        return Guess(Answer.GUESSES, len(self._seen), not self._relevance.drawn, late)
+            return Guess(GuessingVerdict.TELLS_APART, len(self._seen), False, perhaps)
+        return Guess(GuessingVerdict.GUESSES, len(self._seen), not self._relevance.drawn, late)
 
     # -- at random --
 
@@ -241,15 +241,15 @@ class Guessing:
                     actions[number] = plan[step]
             reached, alike = self._advance(together, actions, np.zeros(len(together), np.uint64))
             if (reached.won > self._level).any():
-                return Guess(Answer.KNOWS, step + 1, True, step + 1)
+                return Guess(GuessingVerdict.KNOWS, step + 1, True, step + 1)
             hopeful = reached.won + reached.going @ self._weights > self._level
             for number in np.flatnonzero(hopeful & ~alike).tolist():
                 if looked_into == _LOOKED_INTO or self._effort.clock.is_over:
                     break
                 looked_into += 1
                 known = self._may_know(reached.part(slice(number, number + 1)), _FEW_STATES)
-                if known is Searched.SOLVABLE:
-                    return Guess(Answer.TELLS_APART, step + 1, True, step + 1)
+                if known is SearchVerdict.SOLVABLE:
+                    return Guess(GuessingVerdict.TELLS_APART, step + 1, True, step + 1)
             kept = np.flatnonzero(hopeful & alike)
             if not len(kept):
                 return None
@@ -260,26 +260,26 @@ class Guessing:
 
     # -- when rooms look different --
 
-    def _may_know(self, apart: _Together, states: int) -> Searched:
+    def _may_know(self, apart: _Together, states: int) -> SearchVerdict:
         """Whether more than a guess gets right can be solved, by who knows which room it is from here on; undecided
         where searches gave up on rooms that would be needed for it.
         """
-        found = Searched.UNSOLVABLE
+        found = SearchVerdict.UNSOLVABLE
         for k in range(len(apart)):
             best = perhaps = int(apart.won[k])
             for room in np.flatnonzero(apart.going[k]).tolist():
                 verdict = self._alone_in(apart.part(slice(k, k + 1)), room, states)
-                best += int(self._weights[room]) * (verdict is Searched.SOLVABLE)
-                perhaps += int(self._weights[room]) * (verdict is not Searched.UNSOLVABLE)
+                best += int(self._weights[room]) * (verdict is SearchVerdict.SOLVABLE)
+                perhaps += int(self._weights[room]) * (verdict is not SearchVerdict.UNSOLVABLE)
             if best > self._level:
-                return Searched.SOLVABLE
+                return SearchVerdict.SOLVABLE
             if perhaps > self._level:
-                found = Searched.UNDECIDED
+                found = SearchVerdict.UNDECIDED
                 if not self._surely:
                     break
         return found
 
-    def _alone_in(self, state: _Together, room: int, states: int) -> Searched:
+    def _alone_in(self, state: _Together, room: int, states: int) -> SearchVerdict:
         """Whether a room can be solved from here on."""
         registers = state.registers[0, room]
         known = states, self._relevance.of_rows(registers).tobytes()
@@ -287,7 +287,7 @@ class Guessing:
             start = registers, state.boards[0, room], state.keys[0, room]
             # Chance makes many states, but where success is not rare a few walks find it.
             if self._alone.stumbles(*start):
-                self._solvable[known] = Searched.SOLVABLE
+                self._solvable[known] = SearchVerdict.SOLVABLE
             else:
                 self._solvable[known] = self._alone.solve(*start, states, self._effort.clock).verdict
         return self._solvable[known]

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.guessing import Answer, Guessing, Plan
+from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
 from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.analysis.rooms import Rooms, Start, start_in, wins_of
-from socialai_dsl.analysis.search import Search, Verdict, marks
+from socialai_dsl.analysis.search import Search, SearchVerdict, marks
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
@@ -39,7 +39,7 @@ _TRIED: Final = 2
 """How many of them are tried in which the success of the room is none."""
 
 
-class Known(Enum):
+class Knowability(Enum):
     """What an agent can know in a room."""
 
     ALL = "all"
@@ -59,7 +59,7 @@ class RoomKnown:
         hidden: what stays hidden, and after which step it shows when it is too late; None: never.
     """
 
-    known: Known
+    known: Knowability
     step: int = 0
     hidden: Mapping[str, int | None] | None = None
 
@@ -105,10 +105,10 @@ class Knowing:
         plan = None if played is None else played.plan
         if plan is None:
             found = self._rooms.success(room, self._effort)
-            if found.verdict is Verdict.UNSOLVABLE:
-                return RoomKnown(Known.NO_SUCCESS)
-            if found.verdict is Verdict.UNDECIDED:
-                return RoomKnown(Known.UNDECIDED)
+            if found.verdict is SearchVerdict.UNSOLVABLE:
+                return RoomKnown(Knowability.NO_SUCCESS)
+            if found.verdict is SearchVerdict.UNDECIDED:
+                return RoomKnown(Knowability.UNDECIDED)
             plan = found.plan
         others = self._others(room)
         if plan is not None:
@@ -122,21 +122,21 @@ class Knowing:
                     step = max(step or 0, known) or None
                     continue
                 guess = self._pair.solve(*self._both(room, other), self._effort, plans, surely=True)
-                if guess.answer in (Answer.KNOWS, Answer.TELLS_APART) and guess.exact:
+                if guess.answer in (GuessingVerdict.KNOWS, GuessingVerdict.TELLS_APART) and guess.exact:
                     step = max(step or 0, guess.step or 0)
                     continue
                 alone = self._alone(other)
-                if alone is Verdict.SOLVABLE and guess.answer is Answer.GUESSES:
+                if alone is SearchVerdict.SOLVABLE and guess.answer is GuessingVerdict.GUESSES:
                     hidden[name] = guess.step
-                elif alone is not Verdict.UNSOLVABLE:
+                elif alone is not SearchVerdict.UNSOLVABLE:
                     undecided = True
         if hidden:
-            return RoomKnown(Known.HIDDEN, step or 0, hidden)
+            return RoomKnown(Knowability.HIDDEN, step or 0, hidden)
         if undecided:
-            return RoomKnown(Known.UNDECIDED)
-        return RoomKnown(Known.NOTHING_TO_KNOW if step is None else Known.ALL, step or 0)
+            return RoomKnown(Knowability.UNDECIDED)
+        return RoomKnown(Knowability.NOTHING_TO_KNOW if step is None else Knowability.ALL, step or 0)
 
-    def _alone(self, other: _Other) -> Verdict:
+    def _alone(self, other: _Other) -> SearchVerdict:
         """Whether a player that knows all of an alternative can solve it."""
         return self._search.solve(*other.start, self._effort.states, self._effort.clock).verdict
 
@@ -190,7 +190,7 @@ class Knowing:
 
 
 @dataclass(frozen=True)
-class Followed:
+class ScriptRun:
     """A script's actions in a room and its alternatives.
 
     Attributes:
@@ -203,7 +203,7 @@ class Followed:
     known: Mapping[int, int]
 
 
-def followed(table: Table, program: Program) -> Followed:
+def followed(table: Table, program: Program) -> ScriptRun:
     """Let the script of a program play a room, in row 0 of a table that was just reset, and alternatives beside it."""
     state, step = table.state, 0
     looks, acts = np.full(table.rows, -1), np.full(table.rows, -1)
@@ -224,10 +224,10 @@ def followed(table: Table, program: Program) -> Followed:
         step += 1
     solved = wins_of(program)[state.registers[:, Register.OUTCOME]]
     if not solved[0]:
-        return Followed(None, {})
+        return ScriptRun(None, {})
     same = acts < 0
     fair = np.flatnonzero(solved & (same | ((looks >= 0) & (looks <= acts)))).tolist()
-    return Followed(plan, {row: 0 if same[row] else int(looks[row]) for row in fair if row})
+    return ScriptRun(plan, {row: 0 if same[row] else int(looks[row]) for row in fair if row})
 
 
 class _Script:
@@ -246,7 +246,7 @@ class _Script:
         self._first_chance, self._chances = 1 + len(copies), chances
         self._program, self._seed = program, effort.seed
 
-    def play(self, room: int) -> Followed:
+    def play(self, room: int) -> ScriptRun:
         """Play the room and all alternatives to the end."""
         self._table.reset(self._seed, {"index": np.full(self._table.rows, room)})
         self._table.state.keys[self._first_chance :, Key.KEY] ^= self._chances

@@ -17,7 +17,7 @@ from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
 from socialai_dsl.semantics.plans import CheckedScenario, Placing
-from socialai_dsl.semantics.terms import Quantified, walk
+from socialai_dsl.semantics.terms import Quantification, walk
 
 _HAPPENING: Final = ("t", "memory", "last", "heard", "pending")
 _ATTEMPTS: Final = 4
@@ -50,7 +50,7 @@ class Peek:
 
 
 @dataclass(frozen=True)
-class Perceived:
+class PerceptionResult:
     """The result of playing twins.
 
     Attributes:
@@ -73,7 +73,7 @@ class _Pair:
     values: tuple[Any, ...]
 
 
-def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> Perceived:
+def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResult:
     """Play the script in rooms 0 to rooms - 1 of a seed and in a twin for each draw of each room.
 
     In the twin that draw, and what follows from it, has another value. The script's actions for the first room are done
@@ -87,7 +87,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> Perceived:
     program = compile_loaded(scripted)
     pairs = list(_pairs(program, scripted.checked, rooms, seed))
     if not pairs:
-        return Perceived(0, ())
+        return PerceptionResult(0, ())
     table = Table([program], 2 * len(pairs), 1)
     index = [number for pair in pairs for number in (pair.index, pair.twin_index)]
     given = [layout for pair in pairs for layout in (pair.layout, pair.twin)]
@@ -106,7 +106,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> Perceived:
         table.batch.step(Task.STEP_ONLY)
         running &= (table.state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
         running &= pairs_alike(table)
-    return Perceived(alike, tuple(sorted(peeks, key=lambda peek: (peek.index, peek.step))))
+    return PerceptionResult(alike, tuple(sorted(peeks, key=lambda peek: (peek.index, peek.step))))
 
 
 def _said(actions: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -307,7 +307,7 @@ def _draws_itself(checked: CheckedScenario) -> bool:
         if frame.entity == 0 and (
             any(rule.chance is not None for rule in frame.rules)
             or any(activity.name == "choose" for activity in frame.activities)
-            or any(isinstance(part, Quantified) and part.op == "pick" for part in walk(frame))
+            or any(isinstance(part, Quantification) and part.op == "pick" for part in walk(frame))
         ):
             return True
     return False

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.guessing import Answer, Guess, Guessing, Plan
-from socialai_dsl.analysis.knowable import Knowing, Known, RoomKnown, followed
+from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict, Plan
+from socialai_dsl.analysis.knowable import Knowability, Knowing, RoomKnown, followed
 from socialai_dsl.analysis.muting import muted
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.reports import (
@@ -30,12 +30,11 @@ from socialai_dsl.analysis.reports import (
     steps_text,
 )
 from socialai_dsl.analysis.rooms import Rooms, name_of, wins_of
-from socialai_dsl.analysis.search import Finding, Search
-from socialai_dsl.analysis.search import Verdict as Searched
+from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
 from socialai_dsl.analysis.twins import (
-    Compared,
     Script,
     Tellers,
+    TwinComparison,
     Twins,
     alike,
     layouts,
@@ -137,17 +136,17 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     named = {"agent", *_named(trial, plan)}
     for room, finding in enumerate(findings):
         missing = trial.rooms.missing(room, named)
-        if missing and finding.verdict is not Searched.SOLVABLE:
+        if missing and finding.verdict is not SearchVerdict.SOLVABLE:
             tally.void.setdefault(f"`{missing[0]}` is absent", []).append(room)
             continue
-        if plan.kind == "never" and finding.verdict is Searched.UNSOLVABLE and finding.states == 1:
+        if plan.kind == "never" and finding.verdict is SearchVerdict.UNSOLVABLE and finding.states == 1:
             tally.void.setdefault("every episode ends at once, or nothing in it changes", []).append(room)
             continue
-        came = finding.verdict is Searched.SOLVABLE
+        came = finding.verdict is SearchVerdict.SOLVABLE
         rooms = tally.held if came is (plan.kind == "reachable") else tally.against
-        (tally.undecided if finding.verdict is Searched.UNDECIDED else rooms).append(room)
-    reached = [k for k, finding in enumerate(findings) if finding.verdict is Searched.SOLVABLE]
-    exact = all(finding.exact or finding.verdict is Searched.UNDECIDED for finding in findings)
+        (tally.undecided if finding.verdict is SearchVerdict.UNDECIDED else rooms).append(room)
+    reached = [k for k, finding in enumerate(findings) if finding.verdict is SearchVerdict.SOLVABLE]
+    exact = all(finding.exact or finding.verdict is SearchVerdict.UNDECIDED for finding in findings)
     said = f"it can come about in {len(reached)} of {rooms_text(tally.rests)}"
     if tally.undecided:
         said += f", {len(tally.undecided)} undecided"
@@ -178,7 +177,7 @@ def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     for room, finding in enumerate(findings):
         if trial.rooms.solved_by_idling[room]:
             tally.void.setdefault(_OF_ITSELF, []).append(room)
-        elif finding.verdict is Searched.UNDECIDED:
+        elif finding.verdict is SearchVerdict.UNDECIDED:
             tally.undecided.append(room)
         elif finding.steps is not None and finding.steps <= plan.steps:
             tally.held.append(room)
@@ -195,7 +194,7 @@ def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 
 def _is_decided(finding: Finding) -> bool:
-    return finding.verdict is not Searched.UNDECIDED
+    return finding.verdict is not SearchVerdict.UNDECIDED
 
 
 def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
@@ -226,7 +225,13 @@ def search_rooms_of(
 # --- by playing ---
 
 _NOBODY_PLAYS: Final = Report(
-    Verdict.FAILS, 0, 0, 0, (), "nobody plays: the agent has no frame, and there is no variant `oracle`", 0
+    Verdict.FAILS,
+    0,
+    0,
+    0,
+    (),
+    "nobody plays: the agent has no frame, and there is no variant `oracle`",
+    0,
 )
 
 
@@ -296,7 +301,7 @@ def _only_through(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 def _searched_for(
     twins: Callable[[], Twins], trial: Trial, values: NDArray[np.int64], effort: Effort
-) -> Iterator[Compared]:
+) -> Iterator[TwinComparison]:
     """Pairs of episodes in which a search finds a difference that neither chance nor a script came upon."""
     pair = Guessing(trial.program, np.ones(2, np.int64))
 
@@ -325,7 +330,7 @@ def _pairs_of(values: Sequence[int], effort: Effort) -> NDArray[np.int64]:
     return np.array([generator.choice(values, 2, replace=False) for _ in range(effort.rooms)], np.int64)
 
 
-def _told(compared: Sequence[Compared], trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+def _told(compared: Sequence[TwinComparison], trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     pairs = sum(one.pairs for one in compared)
     leaks = [leak for one in compared for leak in one.leaks]
     cued = sum(one.cued for one in compared)
@@ -350,10 +355,10 @@ def _told(compared: Sequence[Compared], trial: Trial, plan: PropertyPlan, effort
 # --- without some of the cast ---
 
 _KNOWN: Final = {
-    Answer.GUESSES: "{} {} nothing but a guess",
-    Answer.KNOWS: "in {} it can be known without",
-    Answer.TELLS_APART: "in {} something else tells, and more may be made of it",
-    Answer.UNDECIDED: "in {} it is undecided",
+    GuessingVerdict.GUESSES: "{} {} nothing but a guess",
+    GuessingVerdict.KNOWS: "in {} it can be known without",
+    GuessingVerdict.TELLS_APART: "in {} something else tells, and more may be made of it",
+    GuessingVerdict.UNDECIDED: "in {} it is undecided",
 }
 _NO_SUCCESS: Final = "no success is possible"
 _NEAR: Final = 8_000
@@ -364,16 +369,18 @@ _ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
 
 def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     needing = _Needing(trial, plan, effort)
-    tally, counted, exact = Evidence.empty(), Counter[Answer](), True
-    found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not Answer.UNDECIDED)
+    tally, counted, exact = Evidence.empty(), Counter[GuessingVerdict](), True
+    found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not GuessingVerdict.UNDECIDED)
     for room, (answer, is_exact) in enumerate(found):
         if isinstance(answer, str):
             tally.void.setdefault(answer, []).append(room)
             continue
         counted[answer] += 1
-        exact = exact and (is_exact or answer is not Answer.GUESSES)
-        open_ = answer in (Answer.UNDECIDED, Answer.TELLS_APART)
-        (tally.held if answer is Answer.GUESSES else tally.undecided if open_ else tally.against).append(room)
+        exact = exact and (is_exact or answer is not GuessingVerdict.GUESSES)
+        open_ = answer in (GuessingVerdict.UNDECIDED, GuessingVerdict.TELLS_APART)
+        (
+            tally.held if answer is GuessingVerdict.GUESSES else tally.undecided if open_ else tally.against
+        ).append(room)
     said = ", ".join(
         words.format(rooms_text(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
         for answer, words in _KNOWN.items()
@@ -399,26 +406,30 @@ class _Needing:
         self.told: str | None = None
         """Who or what else tells, in the first room of which that is known."""
 
-    def in_room(self, room: int) -> tuple[Answer | str, bool]:
+    def in_room(self, room: int) -> tuple[GuessingVerdict | str, bool]:
         """The best answer that any of the draws gives, and whether it is exact; in words why a room says nothing."""
         missing = self._trial.rooms.missing(room, ("agent", *self._plan.members))
         if missing:
             return f"`{missing[0]}` is absent", True
         finding = self._alone_in(room, min(_NEAR, self._effort.states))
-        if finding.verdict is Searched.UNSOLVABLE:
+        if finding.verdict is SearchVerdict.UNSOLVABLE:
             return self._with_them(room, finding)
         found = [draw.guess(room, self._effort) for draw in self._without]
         # Without anything to be guessed a success is known by heart.
-        best = min(found, key=lambda guess: _ORDER.index(guess.answer), default=Guess(Answer.KNOWS, 0, True))
-        if best.answer is Answer.GUESSES:
+        best = min(
+            found, key=lambda guess: _ORDER.index(guess.answer), default=Guess(GuessingVerdict.KNOWS, 0, True)
+        )
+        if best.answer is GuessingVerdict.GUESSES:
             return self._better_than_a_guess(room, found.index(best)), best.exact
-        if finding.verdict is Searched.UNDECIDED and (best.answer is Answer.UNDECIDED or not found):
+        if finding.verdict is SearchVerdict.UNDECIDED and (
+            best.answer is GuessingVerdict.UNDECIDED or not found
+        ):
             finding = self._alone_in(room, self._effort.states)
-            if finding.verdict is Searched.UNSOLVABLE:
+            if finding.verdict is SearchVerdict.UNSOLVABLE:
                 return self._with_them(room, finding)
-            if finding.verdict is Searched.UNDECIDED:
-                return Answer.UNDECIDED, False
-        if best.answer is Answer.TELLS_APART and self.told is None:
+            if finding.verdict is SearchVerdict.UNDECIDED:
+                return GuessingVerdict.UNDECIDED, False
+        if best.answer is GuessingVerdict.TELLS_APART and self.told is None:
             told = self._without[found.index(best)].told(room, self._effort, self._tellers)
             self.told = None if told is None else f"in room {room} {told}"
         return best.answer, best.exact
@@ -429,16 +440,18 @@ class _Needing:
         start = state.registers[room], state.boards[room], state.keys[room]
         return self._search.solve(*start, states, self._effort.clock)
 
-    def _with_them(self, room: int, alone: Finding) -> tuple[Answer | str, bool]:
+    def _with_them(self, room: int, alone: Finding) -> tuple[GuessingVerdict | str, bool]:
         """Nobody succeeds without them; with them?"""
         if self._trial.solved[room]:
-            return Answer.GUESSES, alone.exact
+            return GuessingVerdict.GUESSES, alone.exact
         verdict = self._trial.rooms.success(room, self._effort).verdict
-        if verdict is Searched.UNSOLVABLE:
+        if verdict is SearchVerdict.UNSOLVABLE:
             return _NO_SUCCESS, True
-        return (Answer.GUESSES if verdict is Searched.SOLVABLE else Answer.UNDECIDED), alone.exact
+        return (
+            GuessingVerdict.GUESSES if verdict is SearchVerdict.SOLVABLE else GuessingVerdict.UNDECIDED
+        ), alone.exact
 
-    def _better_than_a_guess(self, room: int, number: int) -> Answer | str:
+    def _better_than_a_guess(self, room: int, number: int) -> GuessingVerdict | str:
         """A guess without them says something only if there is more than that with them."""
         path, weighted = self._plan.draws[number]
         if number not in self._with:
@@ -447,17 +460,22 @@ class _Needing:
             self._scripted[number] = None if scripted is None else _Draw(scripted, path, weighted)
         script = self._scripted[number]
         if script is not None and script.is_told(room, self._effort):
-            return Answer.GUESSES
+            return GuessingVerdict.GUESSES
         guess = self._with[number].guess(room, self._effort)
-        if guess.answer is Answer.UNDECIDED:
-            return Answer.UNDECIDED
-        if guess.answer is not Answer.GUESSES:
-            return Answer.GUESSES
-        solvable = self._trial.rooms.success(room, self._effort).verdict is not Searched.UNSOLVABLE
+        if guess.answer is GuessingVerdict.UNDECIDED:
+            return GuessingVerdict.UNDECIDED
+        if guess.answer is not GuessingVerdict.GUESSES:
+            return GuessingVerdict.GUESSES
+        solvable = self._trial.rooms.success(room, self._effort).verdict is not SearchVerdict.UNSOLVABLE
         return _ALWAYS_A_GUESS if solvable else _NO_SUCCESS
 
 
-_ORDER: Final = (Answer.GUESSES, Answer.UNDECIDED, Answer.TELLS_APART, Answer.KNOWS)
+_ORDER: Final = (
+    GuessingVerdict.GUESSES,
+    GuessingVerdict.UNDECIDED,
+    GuessingVerdict.TELLS_APART,
+    GuessingVerdict.KNOWS,
+)
 
 
 _TURNS: Final = 4
@@ -493,7 +511,7 @@ class _Draw:
         self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
         state = self._table.state
         if not alike(self._table, slice(None)):
-            return Guess(Answer.TELLS_APART, 0, True)
+            return Guess(GuessingVerdict.TELLS_APART, 0, True)
         return self._guessing.solve(state.registers, state.boards, state.keys, effort)
 
     def told(self, room: int, effort: Effort, tellers: Tellers) -> str | None:
@@ -523,28 +541,30 @@ class _Draw:
 
 def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     knowing = Knowing(trial.rooms, effort, trial.scripted)
-    found = list(effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Known.UNDECIDED))
+    found = list(
+        effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Knowability.UNDECIDED)
+    )
     tally = Evidence.empty()
     for room, one in enumerate(found):
-        why = _NO_SUCCESS if one.known is Known.NO_SUCCESS else None
+        why = _NO_SUCCESS if one.known is Knowability.NO_SUCCESS else None
         if trial.rooms.missing(room, ("agent",)):
             why = "the agent is absent"
         elif trial.rooms.solved_by_idling[room]:
             why = _OF_ITSELF
         if why is not None:
             tally.void.setdefault(why, []).append(room)
-        elif one.known is Known.UNDECIDED:
+        elif one.known is Knowability.UNDECIDED:
             tally.undecided.append(room)
         else:
-            is_so = (one.known is not Known.HIDDEN) is plan.expected
+            is_so = (one.known is not Knowability.HIDDEN) is plan.expected
             (tally.held if is_so else tally.against).append(room)
     return tally.report(_said_of(found), 1.0 if plan.share is None else plan.share)
 
 
 def _said_of(found: Collection[RoomKnown]) -> str:
     """What can be known, by when, and what stays hidden."""
-    known = [one.step for one in found if one.known is Known.ALL]
-    nothing = sum(one.known is Known.NOTHING_TO_KNOW for one in found)
+    known = [one.step for one in found if one.known is Knowability.ALL]
+    nothing = sum(one.known is Knowability.NOTHING_TO_KNOW for one in found)
     hidden: dict[str, list[int | None]] = {}
     for one in found:
         for name, step in (one.hidden or {}).items():
@@ -556,7 +576,7 @@ def _said_of(found: Collection[RoomKnown]) -> str:
         parts.append(f"in {rooms_text(len(known))} all can be known, within {steps_text(max(known))}")
     if nothing:
         parts.append(f"in {rooms_text(nothing)} success depends on nothing hidden")
-    undecided = sum(one.known is Known.UNDECIDED for one in found)
+    undecided = sum(one.known is Knowability.UNDECIDED for one in found)
     if undecided:
         parts.append(f"in {rooms_text(undecided)} it is undecided")
     return ", ".join(parts)

@@ -11,7 +11,7 @@ from socialai_dsl.draws import GOLDEN, mix
 from socialai_dsl.draws import site as number_of
 from socialai_dsl.program import Header, Program
 from socialai_dsl.semantics.plans import CheckedScenario, Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Quantified, Sited, walk
+from socialai_dsl.semantics.terms import Quantification, SitedTerm, walk
 
 _SITE_MASK: Final = (1 << 31) - 1
 
@@ -51,7 +51,7 @@ def _paths(checked: CheckedScenario) -> Iterator[str]:
     yield from ("room.width", "room.height")
     for item in checked.setup:
         match item:
-            case Drawn(value=Sited(site=site)):
+            case Drawn(value=SitedTerm(site=site)):
                 yield site
             case Placing():
                 yield from (item.site, item.where_site)
@@ -59,7 +59,7 @@ def _paths(checked: CheckedScenario) -> Iterator[str]:
                 yield item.site
                 if item.value is not None:
                     yield item.value.site
-        yield from (part.site for part in walk(item) if isinstance(part, Quantified) and part.site)
+        yield from (part.site for part in walk(item) if isinstance(part, Quantification) and part.site)
 
 
 def _said(path: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.search import Finding, Search, Verdict
+from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
@@ -53,7 +53,7 @@ class Rooms:
     def success(self, room: int, effort: Effort) -> Finding:
         """A shortest success in a room, with luck."""
         found = self._findings.get(room)
-        if found is None or (found.verdict is Verdict.UNDECIDED and not effort.clock.is_over):
+        if found is None or (found.verdict is SearchVerdict.UNDECIDED and not effort.clock.is_over):
             found = self._search.solve(*self.start(room), effort.states, effort.clock)
             self._findings[room] = found
         return found

@@ -44,7 +44,7 @@ _TRIED: Final = 64
 """The number of draws among which those that fall otherwise are looked for."""
 
 
-class Verdict(Enum):
+class SearchVerdict(Enum):
     """The verdict of a search."""
 
     SOLVABLE = "solvable"
@@ -64,7 +64,7 @@ class Finding:
         steps: length of the success that was found, whatever chance it needs; None without one.
     """
 
-    verdict: Verdict
+    verdict: SearchVerdict
     states: int
     plan: tuple[NDArray[np.int64], ...] | None
     exact: bool
@@ -87,7 +87,7 @@ def search_rooms(
         state = table.state
         start = state.registers[row], state.boards[row], state.keys[row]
         finding = searches[program.sha256].solve(*start, states, clock)
-        if clock is not None and clock.is_over and finding.verdict is Verdict.UNDECIDED:
+        if clock is not None and clock.is_over and finding.verdict is SearchVerdict.UNDECIDED:
             return
         yield finding
 
@@ -165,12 +165,12 @@ class Search:
                 if winner is not None:
                     chosen = self._choices_to(*winner)
                     return Finding(
-                        Verdict.SOLVABLE, len(self._parents), self._plan(chosen), True, len(chosen)
+                        SearchVerdict.SOLVABLE, len(self._parents), self._plan(chosen), True, len(chosen)
                     )
                 if len(self._parents) > states or (clock is not None and clock.is_over):
-                    return Finding(Verdict.UNDECIDED, len(self._parents), None, False)
+                    return Finding(SearchVerdict.UNDECIDED, len(self._parents), None, False)
             layer = _joined(following, layer)
-        return Finding(Verdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
+        return Finding(SearchVerdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
 
     def stumbles(
         self, registers: NDArray[np.int16], board: NDArray[np.uint32], key: NDArray[np.uint64]

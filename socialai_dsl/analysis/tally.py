@@ -24,7 +24,7 @@ from socialai_dsl.source import Span
 
 
 @dataclass(frozen=True, order=True)
-class Part:
+class TallyItem:
     """A rule, state, step or outcome by where it is written; members that share a frame share its parts."""
 
     span: Span
@@ -42,7 +42,7 @@ class Tally:
         episodes: how many were played to their end.
     """
 
-    times: Counter[Part]
+    times: Counter[TallyItem]
     endings: Counter[str]
     episodes: int
 
@@ -90,7 +90,7 @@ def tally(
     return watch.tally(ended)
 
 
-def parts_of(checked: CheckedScenario) -> Iterator[Part]:
+def parts_of(checked: CheckedScenario) -> Iterator[TallyItem]:
     """Everything in a scenario that can come about."""
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
@@ -99,22 +99,22 @@ def parts_of(checked: CheckedScenario) -> Iterator[Part]:
         for number, state in enumerate(frame.states):
             yield _state(frame, number)
             yield from (_rule(frame, rule) for rule in state.rules)
-    yield from (Part(rule.span, "rule", rule.name) for rule in checked.rules)
-    yield from (Part(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
+    yield from (TallyItem(rule.span, "rule", rule.name) for rule in checked.rules)
+    yield from (TallyItem(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
 
 
-def _step(frame: FramePlan, number: int) -> Part:
+def _step(frame: FramePlan, number: int) -> TallyItem:
     step = frame.steps[number]
-    return Part(step.span, "step", f"{frame.frame}.{step.state or f'steps[{number}]'}")
+    return TallyItem(step.span, "step", f"{frame.frame}.{step.state or f'steps[{number}]'}")
 
 
-def _state(frame: FramePlan, number: int) -> Part:
+def _state(frame: FramePlan, number: int) -> TallyItem:
     state = frame.states[number]
-    return Part(state.span, "state", f"{frame.frame}.{state.name}")
+    return TallyItem(state.span, "state", f"{frame.frame}.{state.name}")
 
 
-def _rule(frame: FramePlan, rule: Any) -> Part:
-    return Part(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."))
+def _rule(frame: FramePlan, rule: Any) -> TallyItem:
+    return TallyItem(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."))
 
 
 class _Watch:
@@ -151,7 +151,7 @@ class _Watch:
 
     def tally(self, episodes: int) -> Tally:
         """The counts so far."""
-        times: Counter[Part] = Counter()
+        times: Counter[TallyItem] = Counter()
         endings: Counter[str] = Counter()
         counters = self._table.batch.counters
         for frames, first in zip(self._programs, self._table.batch.first_counters, strict=True):
@@ -190,9 +190,9 @@ class _Frames:
             for k in range(len(entered)):
                 entered[k] += np.count_nonzero((old != new) & (first <= k) & (k <= new))
 
-    def times(self, counters: list[int]) -> Counter[Part]:
+    def times(self, counters: list[int]) -> Counter[TallyItem]:
         """How often each part came about, by the engine's counters."""
-        times: Counter[Part] = Counter()
+        times: Counter[TallyItem] = Counter()
         numbers = count()
         for frame, entered in zip(self.checked.frames, self._entered, strict=True):
             for number in range(len(frame.steps)):
@@ -211,6 +211,6 @@ class _Frames:
             times[part] += fired
         return times
 
-    def _of_the_world(self) -> Iterator[Part]:
-        yield from (Part(rule.span, "rule", rule.name) for rule in self.checked.rules)
-        yield from (Part(o.condition.span, "outcome", o.name) for o in self.checked.outcomes)
+    def _of_the_world(self) -> Iterator[TallyItem]:
+        yield from (TallyItem(rule.span, "rule", rule.name) for rule in self.checked.rules)
+        yield from (TallyItem(o.condition.span, "outcome", o.name) for o in self.checked.outcomes)

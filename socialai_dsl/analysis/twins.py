@@ -110,7 +110,7 @@ class Leak:
 
 
 @dataclass(frozen=True)
-class Compared:
+class TwinComparison:
     """The result of playing pairs of twins.
 
     Attributes:
@@ -161,7 +161,7 @@ class Twins:
         rows, state = slice(2 * room, 2 * room + 2), self._table.state
         return state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy()
 
-    def play(self, actions: Actions) -> Compared:
+    def play(self, actions: Actions) -> TwinComparison:
         """Do the same in both of each pair until they differ or one of them ends."""
         pairs = len(self._values)
         state, ports = self._table.state, self._table.batch.ports
@@ -183,7 +183,7 @@ class Twins:
                     leaks.append(self._leak(k, step, tellers))
                 else:
                     cued.append(k)
-        return Compared(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
+        return TwinComparison(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
 
     def _between(self, pair: int, before: NDArray[np.int16]) -> list[str]:
         return self._tellers.between(self._table, (2 * pair, 2 * pair + 1), before)

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Final
 
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.loader.shipped import Shipped, catalogue
+from socialai_dsl.loader.shipped import ShippedScenario, catalogue
 
 SUMMARY: Final = "list the scenarios that ship, with their variants and parameters"
 
@@ -33,7 +33,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD if chosen else Exit.FINDINGS
 
 
-def _lines(one: Shipped) -> list[str]:
+def _lines(one: ShippedScenario) -> list[str]:
     lines = [one.name, f"    {one.about}"]
     if one.variants:
         lines.append("    " + " ".join(f"+{variant}" for variant in one.variants))

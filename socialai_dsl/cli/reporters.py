@@ -11,7 +11,7 @@ from socialai_dsl.source import Source
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedInput:
     """One checked input and what was found in it, or in files it uses.
 
     Attributes:
@@ -37,7 +37,7 @@ class Checked:
         return sum(d.severity is Severity.WARNING for d in self.diagnostics)
 
 
-def limited(checked: Sequence[Checked], most: int) -> list[Checked]:
+def limited(checked: Sequence[CheckedInput], most: int) -> list[CheckedInput]:
     """The results with the first `most` errors alone; one in a file that several inputs share counts once."""
     errors = [d for d in _all(checked) if d.severity is Severity.ERROR]
     hidden = set(errors[most:])
@@ -51,7 +51,7 @@ def limited(checked: Sequence[Checked], most: int) -> list[Checked]:
     ]
 
 
-def report_text(checked: Sequence[Checked], color: bool) -> str:
+def report_text(checked: Sequence[CheckedInput], color: bool) -> str:
     """One block per finding with the line it points at, then a summary."""
     diagnostics = _all(checked)
     sources = {name: source for c in checked for name, source in c.sources.items()}
@@ -68,13 +68,13 @@ def report_text(checked: Sequence[Checked], color: bool) -> str:
     return "\n".join([*(render_text([d], sources, color) for d in diagnostics), summary, *more])
 
 
-def report_json(checked: Sequence[Checked], color: bool) -> str:
+def report_json(checked: Sequence[CheckedInput], color: bool) -> str:
     """An array of findings."""
     del color
     return json.dumps(to_json(_all(checked)), indent=2, ensure_ascii=False)
 
 
-def report_github(checked: Sequence[Checked], color: bool) -> str:
+def report_github(checked: Sequence[CheckedInput], color: bool) -> str:
     """GitHub workflow commands, shown as annotations of the changed lines."""
     del color
     lines = []
@@ -92,7 +92,7 @@ def report_github(checked: Sequence[Checked], color: bool) -> str:
     return "\n".join(lines)
 
 
-def report_sarif(checked: Sequence[Checked], color: bool) -> str:
+def report_sarif(checked: Sequence[CheckedInput], color: bool) -> str:
     """A SARIF 2.1.0 log."""
     del color
     diagnostics = _all(checked)
@@ -113,7 +113,7 @@ def report_sarif(checked: Sequence[Checked], color: bool) -> str:
     return json.dumps(log, indent=2, ensure_ascii=False)
 
 
-def report_junit(checked: Sequence[Checked], color: bool) -> str:
+def report_junit(checked: Sequence[CheckedInput], color: bool) -> str:
     """A JUnit XML file: one test case per checked file; warnings are its output, errors its failures."""
     del color
     failed = sum(c.errors > 0 for c in checked)
@@ -132,7 +132,7 @@ def report_junit(checked: Sequence[Checked], color: bool) -> str:
     return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)
 
 
-REPORTERS: Final[dict[str, Callable[[Sequence[Checked], bool], str]]] = {
+REPORTERS: Final[dict[str, Callable[[Sequence[CheckedInput], bool], str]]] = {
     "text": report_text,
     "json": report_json,
     "github": report_github,
@@ -142,7 +142,7 @@ REPORTERS: Final[dict[str, Callable[[Sequence[Checked], bool], str]]] = {
 """Format -> function from what was checked, and whether to colour, to the report."""
 
 
-def _all(checked: Iterable[Checked]) -> list[Diagnostic]:
+def _all(checked: Iterable[CheckedInput]) -> list[Diagnostic]:
     """Every finding once, even where several inputs share the file it lies in."""
     return list(dict.fromkeys(d for c in checked for d in c.diagnostics))
 

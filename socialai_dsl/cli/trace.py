@@ -75,12 +75,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play the episode and print it."""
-    from socialai_dsl.evaluation.episode_trace import Traced, reset_of
+    from socialai_dsl.evaluation.episode_trace import EpisodeTracer, reset_of
 
     reset = reset_of(arguments.seed, arguments.index, arguments.test_episode, arguments.layout)
     if arguments.json and (arguments.why or arguments.first > 1):
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
-    traced = Traced(arguments.scenario, arguments.agent, arguments.do, arguments.seed)
+    traced = EpisodeTracer(arguments.scenario, arguments.agent, arguments.do, arguments.seed)
     try:
         trace = traced.begin(reset)
         _check_names(arguments.why, trace)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from socialai_dsl.cli.arguments import add_effort, positive
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
-from socialai_dsl.cli.reporters import REPORTERS, Checked, limited
+from socialai_dsl.cli.reporters import REPORTERS, CheckedInput, limited
 from socialai_dsl.cli.terminal import ProgressLine, shows_color
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
 
@@ -87,7 +87,7 @@ def _expand(paths: list[str]) -> Iterator[str]:
                 yield name
 
 
-def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
+def _checked(name: str, stdin_filename: str) -> tuple[CheckedInput, "CheckResult"]:
     from socialai_dsl import frontend
 
     if name == STDIN:
@@ -95,7 +95,7 @@ def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
             texts = standard_input(stdin_filename)
         except ScenarioError as error:  # no text at all, which is a finding in it as in a file
             nothing = frontend.CheckResult(stdin_filename, None, None, error.diagnostics, error.sources, None)
-            return Checked(stdin_filename, error.diagnostics, error.sources), nothing
+            return CheckedInput(stdin_filename, error.diagnostics, error.sources), nothing
         result = frontend.check(Path(stdin_filename).absolute(), texts, every_value=True)
         name = stdin_filename
     else:
@@ -106,10 +106,10 @@ def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
         if result.has_errors and is_usage(result.diagnostics):
             raise ScenarioError(result.diagnostics, result.sources)
     found = (*result.diagnostics, *_misfits(result))
-    return Checked(name, found, dict(result.sources)), result
+    return CheckedInput(name, found, dict(result.sources)), result
 
 
-def _without_used(results: Iterable[tuple[Checked, "CheckResult"]]) -> list[Checked]:
+def _without_used(results: Iterable[tuple[CheckedInput, "CheckResult"]]) -> list[CheckedInput]:
     """What was checked, where a comment that is idle in its own file but silences a warning in another's is fine."""
     from socialai_dsl.frontend import UNUSED
 

@@ -9,7 +9,17 @@ from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.hands import is_member
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
 from socialai_dsl.semantics.plans import Activity, CheckedScenario
-from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Sited, Term
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    CellOf,
+    Const,
+    FieldOf,
+    Measure,
+    ObjectType,
+    Read,
+    SitedTerm,
+    Term,
+)
 
 _BODIES = {
     "left": Body.LEFT,
@@ -295,7 +305,7 @@ class Activities:
 
     def _unless_seen(self, activity: Activity, otherwise: Label) -> None:
         """Fall through if it sees what it searches for; what is not found is not seen."""
-        self.to.sited_condition(Sited(activity.args[0], activity.site, activity.span), otherwise)
+        self.to.sited_condition(SitedTerm(activity.args[0], activity.site, activity.span), otherwise)
 
     def _enter(self, activity: Activity) -> None:
         """Use it while it cannot be walked on, then go there; a member that is there stays."""

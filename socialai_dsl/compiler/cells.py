@@ -124,7 +124,7 @@ class Emitter(ABC):
         self.block.emit(op, result, b, c)
         return result
 
-    def instance(self, term: terms.Quantified, item: Const) -> Term:
+    def instance(self, term: terms.Quantification, item: Const) -> Term:
         """The condition of a quantifier for one of its items."""
         return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)
 
@@ -159,7 +159,7 @@ def keep_each(to: Emitter, board: int, condition: Term, name: str = "") -> None:
     block.release(mark)
 
 
-def count_cells(to: Emitter, term: terms.Quantified, opposite: bool = False) -> int:
+def count_cells(to: Emitter, term: terms.Quantification, opposite: bool = False) -> int:
     """A temporary with the number of cells that the condition of a quantifier (or its opposite) holds for."""
     boards = to.block.boards_taken
     result = to.block.temporary()
@@ -168,7 +168,7 @@ def count_cells(to: Emitter, term: terms.Quantified, opposite: bool = False) -> 
     return result
 
 
-def one_cell(to: Emitter, term: terms.Quantified) -> int:
+def one_cell(to: Emitter, term: terms.Quantification) -> int:
     """The cell that `first`, `pick` or `nearest` chooses; none: on to `to.failed`, or at a reset the first of all."""
     block = to.block
     boards = block.boards_taken
@@ -196,7 +196,7 @@ def one_cell(to: Emitter, term: terms.Quantified) -> int:
     return result
 
 
-def _cells_of(to: Emitter, term: terms.Quantified, opposite: bool = False) -> int:
+def _cells_of(to: Emitter, term: terms.Quantification, opposite: bool = False) -> int:
     """A fresh board with the floor cells that a quantifier is about."""
     board = to.block.board()
     to.block.emit(Op.B_FLOOR, board)
@@ -249,11 +249,11 @@ def conjuncts(to: Emitter, condition: Term) -> Iterator[Term]:
     match condition:
         case terms.Logic(op="and"):
             parts = condition.args
-        case terms.Quantified(op="all", cells=False):
+        case terms.Quantification(op="all", cells=False):
             parts = (to.instance(condition, item) for item in condition.items)
         case terms.Not(arg=terms.Logic(op="or", args=args)):
             parts = map(terms.Not, args)
-        case terms.Not(arg=terms.Quantified(op="any", cells=False) as every):
+        case terms.Not(arg=terms.Quantification(op="any", cells=False) as every):
             parts = (terms.Not(to.instance(every, item)) for item in every.items)
         case terms.Compare(op="!="):
             yield terms.Not(replace(condition, op="=="))
@@ -394,21 +394,21 @@ _LAST_NEAREST = 255
 """What `Op.NEAREST` has room for."""
 
 
-def count_things(to: Emitter, term: terms.Quantified) -> int:
+def count_things(to: Emitter, term: terms.Quantification) -> int:
     """A temporary with the number of things that the condition holds for."""
     if len(term.items) > _SET:
         return _count_one_by_one(to, term)
     return to.into_temporary(Op.COUNT_BITS, _mask(to, term))
 
 
-def first_thing(to: Emitter, term: terms.Quantified) -> int:
+def first_thing(to: Emitter, term: terms.Quantification) -> int:
     """The operand of the first thing that the condition holds for."""
     if len(term.items) > _SET:
         return _nth(to, term, to.into_temporary(Op.LOAD, constant(0)))
     return _chosen(to, term, Op.LOWEST_BIT)
 
 
-def _mask(to: Emitter, term: terms.Quantified) -> int:
+def _mask(to: Emitter, term: terms.Quantification) -> int:
     """A temporary whose bit i says whether item i holds."""
     mask = to.block.temporary()
     to.block.emit(Op.LOAD, mask, constant(0))
@@ -420,7 +420,7 @@ def _mask(to: Emitter, term: terms.Quantified) -> int:
     return mask
 
 
-def picked_thing(to: Emitter, term: terms.Quantified) -> int:
+def picked_thing(to: Emitter, term: terms.Quantification) -> int:
     """The operand of a drawn thing among those that the condition holds for."""
     site = to.sites.row(term.site or to.site, term.ordinal)
     if (other := _but_one(term)) is not None:
@@ -433,7 +433,7 @@ def picked_thing(to: Emitter, term: terms.Quantified) -> int:
     return _item(to, term.items, to.into_temporary(Op.DRAW, constant(len(term.items)), site))
 
 
-def _but_one(term: terms.Quantified) -> terms.Term | None:
+def _but_one(term: terms.Quantification) -> terms.Term | None:
     """The one of its things that `pick(x in group where x != one)` leaves out, if that is what the term is."""
     match term.condition:
         case terms.Compare(
@@ -450,21 +450,21 @@ def _but_one(term: terms.Quantified) -> terms.Term | None:
     return None
 
 
-def _any_other(to: Emitter, term: terms.Quantified, one: terms.Term, site: int) -> int:
+def _any_other(to: Emitter, term: terms.Quantification, one: terms.Term, site: int) -> int:
     """One of all of them less the one, without asking of each whether it is that."""
     assert site <= _LAST_SITE, "internal: more draw sites than an instruction can name"
     packed = site | term.items[0].value << 16 | len(term.items) << 24
     return to.into_temporary(Op.DRAW_OTHER, to.value(one), packed)
 
 
-def _chosen(to: Emitter, term: terms.Quantified, op: Op, site: int = 0) -> int:
+def _chosen(to: Emitter, term: terms.Quantification, op: Op, site: int = 0) -> int:
     mask = _mask(to, term)
     if to.failed is not None:
         to.block.test(Op.IF_NE, mask, constant(0), to.failed)
     return _item(to, term.items, to.into_temporary(op, mask, site))
 
 
-def _count_one_by_one(to: Emitter, term: terms.Quantified) -> int:
+def _count_one_by_one(to: Emitter, term: terms.Quantification) -> int:
     total = to.into_temporary(Op.LOAD, constant(0))
     for item in term.items:
         following = Label()
@@ -474,7 +474,7 @@ def _count_one_by_one(to: Emitter, term: terms.Quantified) -> int:
     return total
 
 
-def _nth(to: Emitter, term: terms.Quantified, left: int) -> int:
+def _nth(to: Emitter, term: terms.Quantification, left: int) -> int:
     """The thing that comes after `left` others that the condition holds for as well; none: as for small groups."""
     block = to.block
     result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
@@ -505,7 +505,7 @@ def _item(to: Emitter, items: tuple[Const, ...], position: int) -> int:
     return result
 
 
-def nearest_thing(to: Emitter, term: terms.Quantified) -> int:
+def nearest_thing(to: Emitter, term: terms.Quantification) -> int:
     """The operand of the nearest thing that the condition holds for."""
     assert term.to is not None
     block, items = to.block, term.items

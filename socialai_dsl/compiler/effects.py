@@ -25,7 +25,7 @@ from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
-from socialai_dsl.compiler.those import Choice, Chosen, sizes
+from socialai_dsl.compiler.those import Choice, MemberSelection, sizes
 from socialai_dsl.program import CELL, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
@@ -39,7 +39,7 @@ from socialai_dsl.semantics.plans import (
     RulePlan,
     StepPlan,
 )
-from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, Sited, Term, Type, numbers_of
+from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, SitedTerm, Term, Type, numbers_of
 
 # -- what the effect `reset` puts back -----------------------------------------------------------------------
 
@@ -231,7 +231,7 @@ class Effects:
     def compute(self, what: RulePlan | StepPlan, failed: Label, speaker: Entity | None) -> Operands:
         """Compute all values; a pick that finds nothing skips to `failed`."""
         to = self.to
-        chosen = Chosen(to, what) if _chooses(what) else None
+        chosen = MemberSelection(to, what) if _chooses(what) else None
         to.failed = failed
         set_to = chosen.set_to if chosen else lambda item: to.sited_copy(item.value)
         sets = tuple(map(set_to, what.sets))
@@ -409,7 +409,7 @@ def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
         _note_whether(to, f"{memory.path}.open", memory.open)
 
 
-def _note_whether(to: Expressions, path: str, condition: Sited) -> None:
+def _note_whether(to: Expressions, path: str, condition: SitedTerm) -> None:
     """Let a register tell whether a condition holds; it is 0 from the reset on."""
     if fold_whole(condition.term, to.facts, to.classes) == FALSE:
         return
@@ -449,7 +449,7 @@ class _Kept:
     high: int
 
 
-class Deferred:
+class DeferredRules:
     """The rules of a frame that are done in two parts; `MEMBER.kept[k]` hold values, `MEMBER.pending` which rule.
 
     Attributes:

@@ -100,7 +100,7 @@ class Expressions(Emitter):
 
     # --- conditions ---
 
-    def sited_condition(self, sited: terms.Sited, otherwise: Label) -> None:
+    def sited_condition(self, sited: terms.SitedTerm, otherwise: Label) -> None:
         """A condition with its own site and place in the source. It is false if something in it finds nothing."""
         self.site, self.block.span = sited.site, sited.span
         failed, self.failed = self.failed, otherwise
@@ -146,11 +146,11 @@ class Expressions(Emitter):
                 block.test(Op.IF_CHANCE, chance_word(term.probability), site, otherwise)
             case terms.Select():
                 selected_condition(self, term, otherwise)
-            case terms.Quantified(op="any", cells=True):
+            case terms.Quantification(op="any", cells=True):
                 block.test(Op.IF_NE, count_cells(self, term), constant(0), otherwise)
-            case terms.Quantified(op="all", cells=True):
+            case terms.Quantification(op="all", cells=True):
                 block.test(Op.IF_EQ, count_cells(self, term, opposite=True), constant(0), otherwise)
-            case terms.Quantified(op="any" | "all"):
+            case terms.Quantification(op="any" | "all"):
                 self.condition(fold(term, self.facts, self.classes), otherwise)
             case terms.PokedNow():
                 block.test(Op.IF_EQ, Register.POKED, self.value(term.entity), otherwise)
@@ -231,7 +231,7 @@ class Expressions(Emitter):
 
     # --- values ---
 
-    def sited_value(self, sited: terms.Sited) -> int:
+    def sited_value(self, sited: terms.SitedTerm) -> int:
         """A value with its own site and place in the source, within its type."""
         self.site, self.block.span = sited.site, sited.span
         return self.saturated(fold(sited.term, self.facts, self.classes))
@@ -288,17 +288,17 @@ class Expressions(Emitter):
                 return self._heard(Op.HEARD_NOUN, term)
             case terms.Select():
                 return selected_value(self, term)
-            case terms.Quantified(op="count", cells=True):
+            case terms.Quantification(op="count", cells=True):
                 return count_cells(self, term)
-            case terms.Quantified(op="first" | "pick" | "nearest", cells=True):
+            case terms.Quantification(op="first" | "pick" | "nearest", cells=True):
                 return one_cell(self, term)
-            case terms.Quantified(op="pick"):
+            case terms.Quantification(op="pick"):
                 return picked_thing(self, term)
-            case terms.Quantified(op="first"):
+            case terms.Quantification(op="first"):
                 return first_thing(self, term)
-            case terms.Quantified(op="count"):
+            case terms.Quantification(op="count"):
                 return count_things(self, term)
-            case terms.Quantified(op="nearest"):
+            case terms.Quantification(op="nearest"):
                 return nearest_thing(self, term)
             case terms.Variable():
                 return self._loop(term.name).cell
@@ -364,7 +364,7 @@ class Expressions(Emitter):
         number = self.into_temporary(Op.MAX, number, constant(term.type.low))
         return self.into_temporary(Op.MIN, number, constant(term.type.high))
 
-    def sited_copy(self, sited: terms.Sited) -> int:
+    def sited_copy(self, sited: terms.SitedTerm) -> int:
         """The same in a temporary that nothing else changes or reads."""
         mark, value = self.block.taken, self.sited_value(sited)
         if not TEMPORARY <= value < CONSTANT // 2:
@@ -401,7 +401,7 @@ class Expressions(Emitter):
             result = self.into_temporary(_ARITHMETIC[term.op], result, self.value(arg))
         return result
 
-    def note_whether(self, register: int, condition: terms.Sited) -> None:
+    def note_whether(self, register: int, condition: terms.SitedTerm) -> None:
         """Let a register tell whether a condition holds."""
         self.block.emit(Op.LOAD, register, constant(0))
         false = Label()
@@ -597,7 +597,7 @@ class Lines:
         return result if first == 0 else to.into_temporary(Op.ADD, result, constant(first))
 
     @staticmethod
-    def _said_to(to: Expressions, varying: Sequence[Term], addressee: terms.Sited, first: int) -> int:
+    def _said_to(to: Expressions, varying: Sequence[Term], addressee: terms.SitedTerm, first: int) -> int:
         """The operand of a line that is said to one of several."""
         *others, member = varying
         size = member.type.size

@@ -224,7 +224,7 @@ def substitute(term: Term, name: str, value: Const) -> Term:
     """The term with the quantifier's variable replaced by one of its items."""
     if isinstance(term, terms.Variable):
         return value if term.name == name else term
-    if isinstance(term, terms.Quantified) and term.variable == name:
+    if isinstance(term, terms.Quantification) and term.variable == name:
         return term
     found: Term = rebuilt(term, lambda part: substitute(part, name, value))
     return found
@@ -252,7 +252,7 @@ def _decide(term: Term) -> Term:
         return _decide_compared(term, term.left)
     if isinstance(term, terms.Select):
         return _decide_select(term)
-    if isinstance(term, terms.Quantified) and term.op in ("any", "all") and not term.cells:
+    if isinstance(term, terms.Quantification) and term.op in ("any", "all") and not term.cells:
         return _decide_quantified(term)
     if isinstance(term, terms.ReadEach):
         return term.known() or term
@@ -313,7 +313,7 @@ def _decide_compared(term: terms.Compare, left: terms.Select) -> Term:
     return _decide_select(terms.Select(BOOL, left.conditions, values, default))
 
 
-def _decide_quantified(term: terms.Quantified) -> Term:
+def _decide_quantified(term: terms.Quantification) -> Term:
     """Any and all are an `or` and an `and` over the items."""
     parts = tuple(_decided(substitute(term.condition or TRUE, term.variable, item)) for item in term.items)
     if not parts:
@@ -342,7 +342,7 @@ class When(IntEnum):
     ANY_TIME = 2
 
 
-class Changes:
+class ChangeAnalysis:
     """Answers for one scenario. What it says is never too little; now and then it is too much."""
 
     def __init__(self, checked: CheckedScenario) -> None:
@@ -383,7 +383,7 @@ class Changes:
                 return When.ANY_TIME
             case terms.SaidBy() | terms.Speaker() | terms.HeardNoun():
                 return When.ANY_TIME
-            case terms.InState() | terms.Chance() | terms.Quantified(op="pick"):
+            case terms.InState() | terms.Chance() | terms.Quantification(op="pick"):
                 return When.ANY_TIME
             case terms.Read():
                 if term.path.startswith("memory.") or term.path in self.written:
@@ -401,15 +401,15 @@ class Changes:
                 return self._sees(term)
             case terms.Test():
                 return self._test(term)
-            case terms.Quantified(cells=False):
+            case terms.Quantification(cells=False):
                 return self._items(term)
-            case terms.Quantified() if term.to is not None:
+            case terms.Quantification() if term.to is not None:
                 return max(self._parts(term), self._place(term.to))
             case terms.Operation() | terms.Compare() | terms.Logic() | terms.Not() | terms.Select():
                 return self._parts(term)
             case terms.ReadEach():
                 return self._parts(term)
-            case terms.Quantified():
+            case terms.Quantification():
                 return self._parts(term)
             case _:
                 assert_never(term)
@@ -418,7 +418,7 @@ class Changes:
         """Of a term that only combines others."""
         return max((self.of(part) for part in children(term) if isinstance(part, Term)), default=When.NEVER)
 
-    def _items(self, term: terms.Quantified) -> When:
+    def _items(self, term: terms.Quantification) -> When:
         conditions = [
             substitute(term.condition, term.variable, item)
             for item in term.items

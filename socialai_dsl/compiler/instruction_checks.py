@@ -113,7 +113,7 @@ def pointing_range(program: Program, entity: int) -> Interval:
     return 0, CELL + 32 * program.header(Header.CANVAS_HEIGHT) - 1
 
 
-class Known:
+class PathFacts:
     """What is known on a path: ranges of temporaries, boards that are filled (what is absent was never written), and
     whether the room has its size.
     """
@@ -124,9 +124,9 @@ class Known:
         self.temporaries: dict[int, Interval] = {}
         self.boards: set[int] = set()
 
-    def copy(self) -> Known:
+    def copy(self) -> PathFacts:
         """The same, to be changed by itself."""
-        known = Known(self.ranges, self.has_room)
+        known = PathFacts(self.ranges, self.has_room)
         known.temporaries, known.boards = dict(self.temporaries), set(self.boards)
         return known
 
@@ -154,7 +154,7 @@ class Known:
             return f"may write {interval[0]}..{interval[1]} to register {target}, which holds {low}..{high}"
         return None
 
-    def joined(self, other: Known | None) -> Known:
+    def joined(self, other: PathFacts | None) -> PathFacts:
         """The knowledge where two paths meet."""
         known = self.copy()
         if other is not None:
@@ -164,7 +164,7 @@ class Known:
             known.has_room &= other.has_room
         return known
 
-    def after_loop(self, written: Iterable[int], before: Known) -> Known:
+    def after_loop(self, written: Iterable[int], before: PathFacts) -> PathFacts:
         """The knowledge behind a loop that ran any number of times, including none.
 
         A temporary that was written inside may hold anything, or was never written unless it was before the loop.
@@ -202,7 +202,7 @@ _FREE: Final = frozenset((Kind.UNUSED, Kind.SKIP, Kind.TARGET))
 def problem_of(
     instruction: tuple[int, int, int, int],
     program: Program,
-    known: Known,
+    known: PathFacts,
     writable: frozenset[int],
     is_agents: bool = False,
 ) -> str | None:
@@ -233,7 +233,7 @@ class _Check:
         entry: Instruction,
         words: list[int],
         program: Program,
-        known: Known,
+        known: PathFacts,
         writable: frozenset[int],
         is_agents: bool,
     ) -> None:

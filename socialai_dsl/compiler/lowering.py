@@ -19,7 +19,7 @@ from socialai_dsl.compiler.activities import (
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
-    Deferred,
+    DeferredRules,
     Effects,
     Homes,
     links,
@@ -56,7 +56,7 @@ from socialai_dsl.semantics.plans import (
 from socialai_dsl.semantics.terms import BOOL, Type
 
 
-class Asked:
+class RuleConditions:
     """The conditions of a rule while its code is emitted; this one notes nothing."""
 
     def unless(self, key: str, otherwise: Label) -> Label:
@@ -67,7 +67,7 @@ class Asked:
         """Where to skip to if a value finds nothing."""
         return otherwise
 
-    def condition(self, to: Expressions, key: str, sited: terms.Sited, otherwise: Label) -> None:
+    def condition(self, to: Expressions, key: str, sited: terms.SitedTerm, otherwise: Label) -> None:
         """Emit a condition."""
         to.sited_condition(sited, otherwise)
 
@@ -81,11 +81,13 @@ class NoteTaker:
     recording = False
     """Whether every rule is asked, also one that cannot hold."""
 
-    def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
+    def rule(
+        self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None
+    ) -> RuleConditions:
         """For the code of a rule or an entry of `steps` of a member of the cast; None: of the world."""
         return _NOTHING_NOTED
 
-    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
+    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> RuleConditions:
         """For the code of an outcome."""
         return _NOTHING_NOTED
 
@@ -93,7 +95,7 @@ class NoteTaker:
         """Let a program have the registers that this takes."""
 
 
-_NOTHING_NOTED = Asked()
+_NOTHING_NOTED = RuleConditions()
 NO_NOTES = NoteTaker()
 
 
@@ -174,7 +176,7 @@ def frame_code(allocation: Allocation, number: int, frame: FramePlan) -> FrameCo
 def _conditions(
     to: Expressions,
     rule: RulePlan,
-    asked: Asked,
+    asked: RuleConditions,
     following: Label,
     once: int | None,
     clock: int | None = None,
@@ -227,7 +229,7 @@ class _FrameCompiler:
         }
         self.speaker = shared.checked.entities[frame.entity]
         self._is_agents = frame.entity == AGENT
-        self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
+        self.later = DeferredRules(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: plans.Activity) -> Type:
         if activity.name in ACTS:
@@ -349,10 +351,10 @@ class _FrameCompiler:
         asked.report(to, following)
         to.block.bind(following)
 
-    def _asked(self, to: Expressions, what: RulePlan | StepPlan) -> Asked:
+    def _asked(self, to: Expressions, what: RulePlan | StepPlan) -> RuleConditions:
         return self.shared.notes.rule(to, self.counters[what.name], what, self.frame.entity)
 
-    def _conditions(self, to: Expressions, rule: RulePlan, asked: Asked, following: Label) -> None:
+    def _conditions(self, to: Expressions, rule: RulePlan, asked: RuleConditions, following: Label) -> None:
         _conditions(to, rule, asked, following, self.once.get(rule.name), self.clock)
 
     def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
@@ -631,7 +633,7 @@ def world_rules(to: Expressions, allocation: Allocation) -> None:
             to.block.bind(following)
 
 
-def _world_rule(to: Expressions, allocation: Allocation, rule: RulePlan, asked: Asked) -> None:
+def _world_rule(to: Expressions, allocation: Allocation, rule: RulePlan, asked: RuleConditions) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
     assert rule.do is None, "internal: the world has no body"

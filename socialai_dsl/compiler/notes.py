@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from socialai_dsl.compiler.assembler import Label, Registers, constant, label, state_names
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
-from socialai_dsl.compiler.lowering import Asked, NoteTaker
+from socialai_dsl.compiler.lowering import NoteTaker, RuleConditions
 from socialai_dsl.grammar.ast import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
@@ -37,7 +37,7 @@ class Value:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ConditionPart:
     """A part of what must hold for a rule to fire.
 
     Attributes:
@@ -64,7 +64,7 @@ class Note:
 
     register: int
     plan: RulePlan | StepPlan | OutcomePlan
-    parts: list[Part] = field(default_factory=list)
+    parts: list[ConditionPart] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -93,13 +93,15 @@ class Recorder(NoteTaker):
         self.outcomes: dict[int, Note] = {}
         self.names: list[RegisterName] = []
 
-    def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
+    def rule(
+        self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None
+    ) -> RuleConditions:
         """See `NoteTaker.rule`; a rule that is emitted several times is noted in one place."""
         if counter not in self.rules:
             self.rules[counter] = Note(self.register(), plan)
         return _Noting(self, self.rules[counter], self._aside(to, entity))
 
-    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
+    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> RuleConditions:
         """See `NoteTaker.outcome`."""
         if number not in self.outcomes:
             self.outcomes[number] = Note(self.register(), plan)
@@ -169,7 +171,7 @@ class _Pad:
     label: Label = field(default_factory=Label)
 
 
-class _Noting(Asked):
+class _Noting(RuleConditions):
     """Notes the parts of one rule."""
 
     def __init__(self, recorder: Recorder, note: Note, aside: dict[str, list[_Shown]]) -> None:
@@ -184,7 +186,7 @@ class _Noting(Asked):
     def nothing(self, key: str, otherwise: Label) -> Label:
         return self._pad(-self._number(key, "", ()))
 
-    def condition(self, to: Expressions, key: str, sited: terms.Sited, otherwise: Label) -> None:
+    def condition(self, to: Expressions, key: str, sited: terms.SitedTerm, otherwise: Label) -> None:
         to.site, to.block.span = sited.site, sited.span
         failed = to.failed
         for term, reading in _conjuncts(sited, self._recorder.readings):
@@ -224,7 +226,7 @@ class _Noting(Asked):
         self._count += 1
         if len(self._note.parts) < self._count:
             values = tuple(self._value(one) for one in shown)
-            self._note.parts.append(Part(key, words, values))
+            self._note.parts.append(ConditionPart(key, words, values))
         return self._count
 
     def _value(self, shown: _Shown) -> Value:
@@ -240,7 +242,7 @@ class _Noting(Asked):
 # --- parts of conditions, and what they are about --------------------------------------------------------------------
 
 
-def _conjuncts(sited: terms.Sited, readings: Readings) -> list[tuple[Term, Reading | None]]:
+def _conjuncts(sited: terms.SitedTerm, readings: Readings) -> list[tuple[Term, Reading | None]]:
     """The conditions that must all hold, in order, each with how it was written."""
     root = readings.roots.get(sited.site)
     read = list(root.conjuncts()) if root is not None else []
@@ -312,4 +314,4 @@ def _state_of(term: terms.InState, checked: CheckedScenario) -> _Shown:
 
 def _is_free(term: Term) -> bool:
     """Whether a term means something only within a choice among things."""
-    return mentions(term, terms.Variable) and not isinstance(term, terms.Quantified)
+    return mentions(term, terms.Variable) and not isinstance(term, terms.Quantification)

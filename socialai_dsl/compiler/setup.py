@@ -13,7 +13,7 @@ from socialai_dsl.compiler.cells import (
 )
 from socialai_dsl.compiler.effects import Homes
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.folding import Changes, When, fold, mentions
+from socialai_dsl.compiler.folding import ChangeAnalysis, When, fold, mentions
 from socialai_dsl.compiler.hands import into_hands
 from socialai_dsl.compiler.step_order import first_entry
 from socialai_dsl.grammar.ast import every
@@ -23,7 +23,7 @@ from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (
     CheckedScenario,
     Coloring,
-    Computed,
+    ComputedStatus,
     Drawn,
     Entity,
     Facing,
@@ -101,7 +101,7 @@ class Places:
         block = self.to.block
         block.emit(Op.LOAD, target, self.to.value(coordinate))
         somewhere = any(
-            mentions(coordinate, kind) for kind in (terms.FieldOf, terms.Measure, terms.Quantified)
+            mentions(coordinate, kind) for kind in (terms.FieldOf, terms.Measure, terms.Quantification)
         )
         if somewhere or coordinate.type.low < -1 or coordinate.type.high >= size:
             block.emit(Op.MAX, target, target, constant(-1))
@@ -198,7 +198,7 @@ class Places:
                 self.to.block.release_boards(held)
             case terms.Logic():
                 self._keep_either(board, where.args)
-            case terms.Quantified(op="any", cells=False):
+            case terms.Quantification(op="any", cells=False):
                 self._keep_either(board, tuple(self.to.instance(where, item) for item in where.items))
             case _:
                 keep_each(self.to, board, where)
@@ -416,7 +416,7 @@ class ComputedStatuses:
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
-        changes = Changes(checked)
+        changes = ChangeAnalysis(checked)
         whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
         for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
         self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
@@ -438,7 +438,7 @@ class ComputedStatuses:
             _settle(to, item)
 
 
-def _settle(to: Expressions, item: Computed) -> None:
+def _settle(to: Expressions, item: ComputedStatus) -> None:
     """On while the condition holds; off where it was on and the condition does not hold; else left alone."""
     block = to.block
     status = entity_register(item.entity, Field.STATUS)

@@ -36,7 +36,7 @@ Way = Enter | Again | Leave | int
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class NestingLevel:
     """Where an entry stands among the steps that it is nested in.
 
     Attributes:
@@ -60,10 +60,10 @@ def entries_of(order: Sequence[Node]) -> Iterator[int]:
         yield from (node,) if isinstance(node, int) else entries_of(node.body)
 
 
-def levels(order: tuple[Node, ...], k: int, nested: NestedSteps | None = None) -> list[Level]:
+def levels(order: tuple[Node, ...], k: int, nested: NestedSteps | None = None) -> list[NestingLevel]:
     """Where entry k stands, from the outermost level inwards; empty if it is left out for good."""
     for index, node in enumerate(order):
-        level = Level(nested, order, index)
+        level = NestingLevel(nested, order, index)
         if node == k:
             return [level]
         if isinstance(node, NestedSteps) and (found := levels(node.body, k, node)):
@@ -71,7 +71,7 @@ def levels(order: tuple[Node, ...], k: int, nested: NestedSteps | None = None) -
     return []
 
 
-def begun_with(found: Sequence[Level]) -> list[NestedSteps]:
+def begun_with(found: Sequence[NestingLevel]) -> list[NestedSteps]:
     """The nested steps that begin with an entry, from the outermost inwards."""
     begun: list[NestedSteps] = []
     for level in reversed(found):
@@ -81,7 +81,7 @@ def begun_with(found: Sequence[Level]) -> list[NestedSteps]:
     return begun
 
 
-def way_after(found: Sequence[Level]) -> Iterator[Way]:
+def way_after(found: Sequence[NestingLevel]) -> Iterator[Way]:
     """All that may be left out in one turn, after an entry, before another begins.
 
     A round of nested steps goes once round at most: where all of it is left out, so is all of the rounds to come.

@@ -17,7 +17,7 @@ import numpy as np
 
 from socialai_dsl.compiler.assembler import state_names
 from socialai_dsl.compiler.instruction_checks import (
-    Known,
+    PathFacts,
     Ranges,
     inbox_registers,
     problem_of,
@@ -385,14 +385,14 @@ class _Loop:
 
     end: int
     written: frozenset[int] = field(compare=False)
-    before: Known = field(compare=False)
+    before: PathFacts = field(compare=False)
 
 
 @dataclass
 class _Path:
     """What is known before an instruction, and the loop it lies in."""
 
-    known: Known
+    known: PathFacts
     loop: _Loop | None
 
 
@@ -435,7 +435,7 @@ class _Code:
 
     def _block(self, start: int, entry: Header) -> None:
         pending: dict[int, _Path] = {
-            start: _Path(Known(self.ranges, has_room=entry != Header.RESET_PC), None)
+            start: _Path(PathFacts(self.ranges, has_room=entry != Header.RESET_PC), None)
         }
         while pending:
             pc = min(pending)
@@ -450,7 +450,7 @@ class _Code:
                     raise InvalidProgramError(f"at {pc}: a jump into or out of a loop")
                 pending[target] = _Path(known.joined(known_there.known if known_there else None), loop)
 
-    def _next(self, pc: int, path: _Path, entry: Header) -> Iterator[tuple[int, Known, _Loop | None]]:
+    def _next(self, pc: int, path: _Path, entry: Header) -> Iterator[tuple[int, PathFacts, _Loop | None]]:
         op, a, b, c = self.code[pc]
         known, loop = path.known, path.loop
         if op not in TABLE:
@@ -484,7 +484,7 @@ class _Code:
             known, loop = known.after_loop(loop.written, loop.before), None
         yield pc + 1, known, loop
 
-    def _enter_loop(self, pc: int, outer: _Loop | None, known: Known, before: Known) -> _Loop:
+    def _enter_loop(self, pc: int, outer: _Loop | None, known: PathFacts, before: PathFacts) -> _Loop:
         """Temporaries written inside may hold anything at the start of the next round."""
         length = self.code[pc][3]
         end = pc + 1 + length

@@ -9,16 +9,16 @@ from socialai_dsl.compiler.assembler import Block, Label, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.plans import Assignment, Effect, RulePlan, StepPlan
-from socialai_dsl.semantics.terms import Sited, Term
+from socialai_dsl.semantics.terms import SitedTerm, Term
 
 _BITS = 15
 """Bits that stand in one operand, which a register of 16 bits can keep until a body action is done."""
 
 
-def conditions(what: RulePlan | StepPlan) -> list[Sited]:
+def conditions(what: RulePlan | StepPlan) -> list[SitedTerm]:
     """One for each register and thing, in the order in which they are set and affected."""
     of_sets = [item.only for item in what.sets if item.only is not None]
-    of_effects = [Sited(only, effect.site, effect.span) for effect in what.causes for only in effect.only]
+    of_effects = [SitedTerm(only, effect.site, effect.span) for effect in what.causes for only in effect.only]
     return of_sets + of_effects
 
 
@@ -33,7 +33,7 @@ def _bit(bits: tuple[int, ...], number: int) -> tuple[int, int]:
     return bits[number // _BITS], constant(number % _BITS)
 
 
-class Chosen:
+class MemberSelection:
     """Emits, before anything is done, which members are among those, and what only they need.
 
     Attributes:
@@ -55,7 +55,7 @@ class Chosen:
         for effect in what.causes:
             self._numbers[id(effect)] = number
             number += len(effect.only)
-        self._known: dict[Sited, int] = {}
+        self._known: dict[SitedTerm, int] = {}
 
     def set_to(self, item: Assignment) -> int:
         """The operand of what a register is set to; what is the same for all of them is computed once."""
@@ -92,7 +92,7 @@ class Choice:
         self._done = 0
 
     @contextmanager
-    def of(self, only: Sited | Term | None) -> Iterator[None]:
+    def of(self, only: SitedTerm | Term | None) -> Iterator[None]:
         """What is emitted within is done if the next of the conditions held, or always where there is none."""
         if only is None:
             yield

@@ -35,7 +35,7 @@ _TWO_GESTURES: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LinkedProgram:
     """A program and how it is linked into a batch.
 
     Attributes:
@@ -78,7 +78,7 @@ class Batch:
 
     def __init__(
         self,
-        parts: Sequence[Part],
+        parts: Sequence[LinkedProgram],
         pools: Sequence[Sequence[int]],
         pool_of_row: Sequence[int],
         length: int,
@@ -209,7 +209,7 @@ def _board_words(header: NDArray[np.int32]) -> int:
     return width * height + 1 + 2 * height + width
 
 
-def _check_sequences(parts: Sequence[Part], sequences: Sequence[Sequence[int]]) -> None:
+def _check_sequences(parts: Sequence[LinkedProgram], sequences: Sequence[Sequence[int]]) -> None:
     """The clock of an episode in acts is one, so its end must be."""
     for sequence in sequences:
         acts = [parts[number] for number in sequence]
@@ -218,7 +218,7 @@ def _check_sequences(parts: Sequence[Part], sequences: Sequence[Sequence[int]]) 
 
 
 def _link(
-    parts: Sequence[Part],
+    parts: Sequence[LinkedProgram],
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
     shown, more = _shown(parts), _more(parts)
@@ -268,7 +268,7 @@ def _link(
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
 
 
-def _shown(parts: Sequence[Part]) -> int:
+def _shown(parts: Sequence[LinkedProgram]) -> int:
     """What the channels behind the fourth show if one of the programs has them, as bits of `Trait`."""
     shown = 0
     for part in parts:
@@ -281,7 +281,7 @@ def _shown(parts: Sequence[Part]) -> int:
     return shown
 
 
-def _more(parts: Sequence[Part]) -> int:
+def _more(parts: Sequence[LinkedProgram]) -> int:
     """How many channels pictures have behind the fourth; those of looks are the last."""
     shown = _shown(parts)
     others = 2 * bool(shown & Trait.GESTURES) + 2 * bool(shown & Trait.CELLS) + bool(shown & Trait.HANDS)
@@ -332,7 +332,7 @@ def _rolling(words: NDArray[np.int32]) -> tuple[int, int]:
     return (int(found[0]), int(found[-1])) if len(found) else (0, -1)
 
 
-def _with_tokens(part: Part) -> NDArray[np.int32]:
+def _with_tokens(part: LinkedProgram) -> NDArray[np.int32]:
     """The program's words with the batch's token ids."""
     words = part.words.copy()
     lines = int(words[Header.LINES])

@@ -1,8 +1,8 @@
 """Rows of arrays as bare pointers: one machine word each, where an array is seven and a count of references.
 
 What is read through a pointer is an int64 (a uint64 where the array holds such), what is written is cut to the array's
-type. So every helper is compiled for one kind of number. In plain Python pointers become `Guarded`, which finds every
-access outside its row.
+type. So every helper is compiled for one kind of number. In plain Python pointers become `GuardedArray`, which finds
+every access outside its row.
 """
 
 import operator
@@ -41,7 +41,7 @@ def replace_in(book: Any, which: int, array: NDArray[Any]) -> None:
         book[2 * which] = array.ctypes.data
 
 
-class Guarded(Generic[_Scalar]):
+class GuardedArray(Generic[_Scalar]):
     """An array that refuses negative and too large indices."""
 
     def __init__(self, array: NDArray[_Scalar]) -> None:
@@ -95,9 +95,9 @@ def _pointers_to(kind: type[np.generic]) -> Any:
 def _guarded(kind: type[np.generic]) -> Any:
     """The same in plain Python, where numbers are also read as what the caller takes them for."""
 
-    def pointer(book: Any, which: int, row: int) -> Guarded[Any]:
+    def pointer(book: Any, which: int, row: int) -> GuardedArray[Any]:
         array = book[which].view(kind)
-        return Guarded(array[int(row) :] if array.ndim == 1 else array[int(row)])
+        return GuardedArray(array[int(row) :] if array.ndim == 1 else array[int(row)])
 
     return pointer
 

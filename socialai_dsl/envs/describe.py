@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.envs.values import Acts, Addresses, addresses_of, entry_words, shown, utterance_text
+from socialai_dsl.envs.values import ActRegisters, Addresses, addresses_of, entry_words, shown, utterance_text
 from socialai_dsl.program import (
     CELL,
     ENTITY_FIELDS,
@@ -130,7 +130,7 @@ def _carried(program: Program, registers: Row, who: int) -> dict[str, Any]:
     return {}
 
 
-def _act(program: Program, registers: Row, acts: Acts, k: int) -> list[Any]:
+def _act(program: Program, registers: Row, acts: ActRegisters, k: int) -> list[Any]:
     """One element of a sequence or memory: its move and its utterance, None for silence."""
     utterance = acts.utterances.get(k)
     said = _value(program, registers, utterance) if utterance is not None else None

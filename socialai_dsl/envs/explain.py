@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.compilation import Note, Part, Value, compile_noting
+from socialai_dsl.compilation import ConditionPart, Note, Value, compile_noting
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
@@ -76,7 +76,7 @@ _AGENT: Final = 0
 
 
 @dataclass(frozen=True)
-class Moment:
+class RoomState:
     """A room as it is now.
 
     Attributes:
@@ -264,7 +264,7 @@ class _Notes:
         """The number in `Note.register`."""
         return int(self.registers[note.register])
 
-    def values(self, part: Part) -> dict[str, Any]:
+    def values(self, part: ConditionPart) -> dict[str, Any]:
         """The values of a part, by their text."""
         return {value.words: self._value(value) for value in part.values if value.words}
 
@@ -299,7 +299,7 @@ class _Notes:
         mover = [str(entity) for entity in self.program.entities].index(member)
         if goal is None or goal < 0:
             return None
-        moment = Moment(self.program, self.registers, self.board)
+        moment = RoomState(self.program, self.registers, self.board)
         return moment.obstruction(mover, goal, plan.activity.name in _BESIDE_IT)
 
     def _goal(self, term: Term, noted: str) -> int | None:
@@ -311,7 +311,7 @@ class _Notes:
         register = next((found[path] for path in wanted if path in found), None)
         return None if register is None else int(self.registers[register])
 
-    def _plain(self, part: Part) -> list[int]:
+    def _plain(self, part: ConditionPart) -> list[int]:
         return [int(self.registers[value.name.register]) for value in part.values]
 
     def _value(self, value: Value) -> Any:
@@ -321,7 +321,7 @@ class _Notes:
             known = False
         return shown(self.program, name, number) if known else None
 
-    def _heard(self, part: Part) -> str:
+    def _heard(self, part: ConditionPart) -> str:
         """What was heard instead, or why nothing was."""
         count, *classes, distance = self._plain(part)
         said = int(self.registers[Register.UTTERANCE])

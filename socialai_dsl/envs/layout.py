@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.values import (
-    Acts,
+    ActRegisters,
     addresses_of,
     cell_pair,
     entry_words,
@@ -394,7 +394,7 @@ class _Layout:
                 self._act(acts, acts.length - len(held) + k, act, f"memory.{key}[{k}]")
             self.row[self.addresses.filled[key].register] = len(held)
 
-    def _act(self, acts: Acts, k: int, given: Any, key: str) -> None:
+    def _act(self, acts: ActRegisters, k: int, given: Any, key: str) -> None:
         """An element of a sequence or memory: [move, utterance], where None is silence."""
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
             raise ValueError(f"{key}: got {given!r}; expected [move, utterance]")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from gymnasium import spaces
 
-from socialai_dsl.engine.batch import Part
+from socialai_dsl.engine.batch import LinkedProgram
 from socialai_dsl.program import (
     LOOKS,
     NO_GESTURE,
@@ -25,7 +25,7 @@ from socialai_dsl.vocabulary import ACTIONS, Sentences
 
 
 @dataclass(frozen=True)
-class Merged:
+class CommonSpace:
     """The common action space and vocabulary of a batch's programs.
 
     Attributes:
@@ -45,12 +45,12 @@ class Merged:
     pools: tuple[tuple[int, ...], ...]
     outcomes: tuple[tuple[str, bool], ...]
     length: int
-    parts: tuple[Part, ...]
+    parts: tuple[LinkedProgram, ...]
     channels: tuple[str, ...]
     highest: tuple[int, ...]
 
     @classmethod
-    def of(cls, playables: Sequence[Playable]) -> Merged:
+    def of(cls, playables: Sequence[Playable]) -> CommonSpace:
         """Scenarios and suites, each given once."""
         playable = playables[0] if len(playables) == 1 else mixture(playables)
         suite = playable if isinstance(playable, ProgramSuite) else mixture([playable])
@@ -103,12 +103,12 @@ def _pools(playables: Sequence[Playable]) -> tuple[tuple[int, ...], ...]:
 
 def _parts(
     suite: ProgramSuite, outcomes: Sequence[str], playable: Playable, channels: Sequence[str]
-) -> tuple[Part, ...]:
+) -> tuple[LinkedProgram, ...]:
     """Each program with its links into the batch."""
     token = {word: i for i, word in enumerate(playable.vocabulary)}
     ending = {name: i for i, name in enumerate(outcomes)}
     return tuple(
-        Part(
+        LinkedProgram(
             words=program.words,
             rules=len(program.rules),
             outcomes=[ending[name] for name in _endings(member, program, playable)],

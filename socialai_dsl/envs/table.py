@@ -18,7 +18,7 @@ from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.describe import describe, history
 from socialai_dsl.envs.layout import pinned_member, pins_of
-from socialai_dsl.envs.merge import Merged
+from socialai_dsl.envs.merge import CommonSpace
 from socialai_dsl.envs.starts import Starts
 from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
@@ -127,7 +127,7 @@ class Table:
         if threads != 1:
             raise ValueError(f"num_threads: got {threads}; expected 1: to use more cores run more processes")
         different = list({id(playable): playable for playable in playables}.values())
-        self.merged = Merged.of(different)
+        self.merged = CommonSpace.of(different)
         self.programs = self.merged.programs
         number = {id(playable): i for i, playable in enumerate(different)}
         self.pool_of = np.array([number[id(playables[row % len(playables)])] for row in range(rows)])

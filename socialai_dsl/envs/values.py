@@ -28,7 +28,7 @@ _OF_ENTITY: Final = {
 
 
 @dataclass
-class Acts:
+class ActRegisters:
     """The registers of a sequence or memory, by element."""
 
     moves: dict[int, RegisterName] = field(default_factory=dict)
@@ -59,8 +59,8 @@ class Addresses:
     """
 
     def __init__(self, program: Program) -> None:
-        self.sequences: dict[str, Acts] = {}
-        self.memories: dict[str, Acts] = {}
+        self.sequences: dict[str, ActRegisters] = {}
+        self.memories: dict[str, ActRegisters] = {}
         self.filled: dict[str, RegisterName] = {}
         self.one_of: dict[str, RegisterName] = {}
         self.owned: dict[tuple[str, str], RegisterName] = {}
@@ -79,7 +79,7 @@ class Addresses:
         owner, _, rest = name.path.rpartition(".")
         if element := _ELEMENT.fullmatch(name.path):
             group, key, index, part = element.groups()
-            acts = (self.sequences if group == "let" else self.memories).setdefault(key, Acts())
+            acts = (self.sequences if group == "let" else self.memories).setdefault(key, ActRegisters())
             (acts.moves if part == "move" else acts.utterances)[int(index)] = name
         elif look := _LOOK.fullmatch(name.path):
             self.looks.setdefault(look[2], {})[look[1]] = name

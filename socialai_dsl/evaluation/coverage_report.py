@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from socialai_dsl.analysis.effort import Clock
-    from socialai_dsl.analysis.tally import Part, Tally
+    from socialai_dsl.analysis.tally import Tally, TallyItem
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")
@@ -76,7 +76,7 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
             yield agent, scripted
 
 
-def _parts(scenario: str) -> list[Part]:
+def _parts(scenario: str) -> list[TallyItem]:
     """Everything in a scenario that can come about."""
     from socialai_dsl.analysis.tally import parts_of
     from socialai_dsl.checking.loaded import LoadedSuite
@@ -135,7 +135,7 @@ def _forget_nothing(rows: NDArray[np.bool_], episodes: NDArray[np.int64]) -> Non
 class Row:
     """A part and how often it came about with each agent."""
 
-    part: Part
+    part: TallyItem
     times: dict[str, int]
 
     @property
@@ -155,7 +155,7 @@ class Coverage:
 
     def __init__(self) -> None:
         self.scenarios: list[str] = []
-        self.parts: dict[Part, None] = {}
+        self.parts: dict[TallyItem, None] = {}
         self.tallies: dict[str, Tally] = {}
         self.planned, self.interrupted = 0, False
 
@@ -248,7 +248,7 @@ class Coverage:
         }
 
 
-def _place(part: Part) -> str:
+def _place(part: TallyItem) -> str:
     return printable(f"{part.span.file}:{part.span.line}")
 
 

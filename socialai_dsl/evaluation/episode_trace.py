@@ -87,7 +87,7 @@ def trace(
         UsageError: the agent cannot play this, or there is no such episode.
     """
     reset = reset_of(**episode)
-    traced = Traced(scenario, agent, do, episode.get("seed") or 0)
+    traced = EpisodeTracer(scenario, agent, do, episode.get("seed") or 0)
     try:
         found = traced.begin(reset)
         found.steps = list(traced.steps(found))
@@ -132,7 +132,7 @@ def reset_of(
     return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})
 
 
-class Traced:
+class EpisodeTracer:
     """Plays an episode of a scenario.
 
     Args:

@@ -68,7 +68,7 @@ def write_agent(
     from trainer.config import code_folder
     from trainer.shipped import WEIGHTS
 
-    moved = Moved.of(loaded, config.scenario)
+    moved = MovedScenario.of(loaded, config.scenario)
     moved.copy(out)
     code = config.own_files.get("net")
     if code is not None:
@@ -94,7 +94,7 @@ def _without_place(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedScenario:
     """The scenario's own files, which go along; those that ship stay where they are.
 
     Attributes:
@@ -108,7 +108,7 @@ class Moved:
     names: Mapping[str, str]
 
     @classmethod
-    def of(cls, loaded: "Loaded", spec: str) -> "Moved":
+    def of(cls, loaded: "Loaded", spec: str) -> "MovedScenario":
         """The files of a scenario that was named `spec`.
 
         Raises:

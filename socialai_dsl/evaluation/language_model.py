@@ -33,7 +33,7 @@ _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECA
 
 
 @dataclass(frozen=True)
-class Played:
+class ModelEpisodes:
     """The results of test episodes that a model has played.
 
     Attributes:
@@ -57,7 +57,7 @@ def let_a_model_play(
     episodes: int,
     out: Path,
     options: ModelOptions,
-) -> "Played":
+) -> "ModelEpisodes":
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
     Args:
@@ -119,7 +119,7 @@ def let_a_model_play(
     return _outcome(played, program, _probes(played, names))
 
 
-def episodes_of_model(run: Path, program: "Playable", most: int) -> "Played":
+def episodes_of_model(run: Path, program: "Playable", most: int) -> "ModelEpisodes":
     """The results of the first episodes of a model, from their transcripts in the folder `run`.
 
     Raises:
@@ -188,7 +188,7 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
 
 def _outcome(
     played: "Sequence[PlayedEpisode]", program: "Playable", probes: dict[str, Any] | None = None
-) -> "Played":
+) -> "ModelEpisodes":
     import numpy as np
 
     from socialai_dsl.evaluation.episodes import EvalResult
@@ -211,7 +211,7 @@ def _outcome(
     more = [Ending(INVALID, False, "a reply without an action")] if invalid else []
     actions = {episode.number: episode.actions for episode in played}
     replies = {episode.number: episode.replies for episode in played}
-    return Played(result, actions, replies, more, _figures(played) | (probes or {}))
+    return ModelEpisodes(result, actions, replies, more, _figures(played) | (probes or {}))
 
 
 def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:

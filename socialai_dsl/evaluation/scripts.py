@@ -69,7 +69,7 @@ def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
 
 
 @dataclass(frozen=True)
-class Room:
+class UnsolvedRoom:
     """A room that the script did not solve.
 
     Attributes:
@@ -108,7 +108,7 @@ class ScriptReport:
     rooms: int
     solved: int
     mean_length: float
-    unsolved: tuple[Room, ...]
+    unsolved: tuple[UnsolvedRoom, ...]
     searched: int
     interrupted: bool
 
@@ -127,7 +127,7 @@ class ScriptReport:
         """Share of rooms that were not found to be unsolvable: no policy succeeds more often."""
         return 1 - len(self.found("unsolvable")) / self.rooms if self.rooms else 1.0
 
-    def found(self, verdict: str) -> tuple[Room, ...]:
+    def found(self, verdict: str) -> tuple[UnsolvedRoom, ...]:
         """The unsolved rooms with this verdict."""
         return tuple(room for room in self.unsolved if room.verdict == verdict)
 
@@ -163,7 +163,7 @@ class ScriptReport:
         }
 
 
-def _indices(rooms: Sequence[Room]) -> str:
+def _indices(rooms: Sequence[UnsolvedRoom]) -> str:
     """The first of the rooms; the JSON has them all."""
     shown = ", ".join(str(room.index) for room in rooms[:_ROOMS_SHOWN])
     more = len(rooms) - _ROOMS_SHOWN
@@ -201,13 +201,15 @@ def play_script(
         raise KeyboardInterrupt
     success = played.success[: played.rooms]
     found = [
-        Room(
+        UnsolvedRoom(
             index, played.outcomes[index], f.verdict.value, f.exact, len(f.plan) if f.plan else None, f.states
         )
         for index, f in zip(played.failed, findings, strict=False)
     ]
     unsearched = played.failed[len(findings) :]
-    found += [Room(index, played.outcomes[index], "undecided", False, None, 0) for index in unsearched]
+    found += [
+        UnsolvedRoom(index, played.outcomes[index], "undecided", False, None, 0) for index in unsearched
+    ]
     return ScriptReport(
         scenario=scenario,
         seed=seed,

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
     from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.evaluation.episodes import EvalResult, Policy
-    from socialai_dsl.evaluation.language_model import Played
+    from socialai_dsl.evaluation.language_model import ModelEpisodes
     from socialai_dsl.program_suite import Playable
     from socialai_dsl.replay import Trace
-    from socialai_dsl.replay.film import Episode
+    from socialai_dsl.replay.film import RecordedEpisode
     from socialai_dsl.replay.tracing import Think
 
 # Test episodes played together: enough to be fast, and no result depends on it.
@@ -91,7 +91,7 @@ class Evaluation:
 
         return bool(self.result.names[self.result.outcome[number]] == INVALID)
 
-    def record(self, number: int, label: str) -> "Episode":
+    def record(self, number: int, label: str) -> "RecordedEpisode":
         """Play one of the episodes once more, for people to look at.
 
         Args:
@@ -241,7 +241,7 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
 
 
 def _of_model(
-    played: "Played", scenario: str, loaded: "Loaded", program: "Playable", player: Player
+    played: "ModelEpisodes", scenario: str, loaded: "Loaded", program: "Playable", player: Player
 ) -> Evaluation:
     return Evaluation(
         scenario,

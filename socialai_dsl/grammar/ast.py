@@ -249,7 +249,7 @@ class Conditional(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Placed(Node):
+class FilteredRegion(Node):
     """`region where condition`, in a `place:`."""
 
     region: Expr
@@ -274,7 +274,7 @@ Expr = (
     | Arithmetic
     | Negative
     | Conditional
-    | Placed
+    | FilteredRegion
 )
 
 
@@ -483,7 +483,7 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
         return self._made(Conditional(*items, at=meta.start_pos))
 
     def placed(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Placed(*items, at=meta.start_pos))
+        return self._made(FilteredRegion(*items, at=meta.start_pos))
 
 
 def _depth_of(node: Expr) -> int:
@@ -657,13 +657,13 @@ class _Writer:
                 return f"{head}({', '.join(map(self.write, arguments))})"
             case Quantifier(name=word, var=var, group=group) if self._shortened:
                 return f"{word}({var} in {self._inside(group, _CHOICE)} ...)"
-            case Placed(region=region) if self._shortened:
+            case FilteredRegion(region=region) if self._shortened:
                 return f"{self.write(region)} where ..."
             case Quantifier(name=word, var=var, group=group, where=where, to=to):
                 tail = f" where {self.write(where)}" if where is not None else ""
                 tail += f" to {self.write(to)}" if to is not None else ""
                 return f"{word}({var} in {self._inside(group, _CHOICE)}{tail})"
-            case Placed(region=region, where=where):
+            case FilteredRegion(region=region, where=where):
                 return f"{self.write(region)} where {self.write(where)}"
             case _:
                 return self._operation(node)

@@ -14,7 +14,7 @@ from socialai_dsl.envs import make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.factory import Scenario
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, Parsed, ToolCall
-from socialai_dsl.llm.questions import Answered, read_answer
+from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import Style, TextView
 from socialai_dsl.program_suite import outcome_name
 
@@ -110,7 +110,7 @@ class Episode:
         self.language = ActionLanguage(self.env.program)
         self.instructions = self.view.instructions(mode, goal)
         self.actions: list[NDArray[np.int64]] = []
-        self.answered: list[Answered] = []
+        self.answered: list[AnsweredQuestion] = []
         self._asker = None if probes is None else Asker(probes)
         self._questions: list[Question] = []
         self._on_invalid = on_invalid
@@ -163,7 +163,7 @@ class Episode:
         """
         return self._questions[0] if self._questions else None
 
-    def answer(self, reply: str) -> Answered:
+    def answer(self, reply: str) -> AnsweredQuestion:
         """Read a reply to the question; no step passes.
 
         Raises:
@@ -172,7 +172,7 @@ class Episode:
         if not self._questions:
             raise ValueError("answer: got a reply, but nothing is asked")
         question = self._questions.pop(0)
-        self.answered.append(Answered(question, read_answer(reply, question.answers)))
+        self.answered.append(AnsweredQuestion(question, read_answer(reply, question.answers)))
         return self.answered[-1]
 
     def result(self) -> EpisodeResult:

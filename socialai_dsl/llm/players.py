@@ -19,7 +19,7 @@ from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import Episode, EpisodeResult, OnInvalid, Reply, Turn
-from socialai_dsl.llm.questions import Answered, constraints, put
+from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
@@ -94,7 +94,7 @@ class PlayedEpisode:
     replies: list[list[tuple[str, str]]]
     rules: Mapping[str, int]
     usage: Usage
-    answered: Sequence[Answered] = ()
+    answered: Sequence[AnsweredQuestion] = ()
     asking: bool = False
 
     @property

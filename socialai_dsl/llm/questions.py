@@ -17,7 +17,7 @@ _WORD: Final = re.compile(r"(?<!\w)-\d+|(?:[^\W_]|')+")
 
 
 @dataclass(frozen=True)
-class Answered:
+class AnsweredQuestion:
     """A question and what was answered; None if the reply held no answer, or several."""
 
     question: Question
@@ -44,7 +44,7 @@ class Score:
     chance: float | None
 
 
-def score(answered: Iterable[Answered]) -> Score:
+def score(answered: Iterable[AnsweredQuestion]) -> Score:
     """The score of the questions of one probe."""
     found = list(answered)
     return Score(

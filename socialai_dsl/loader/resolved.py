@@ -41,7 +41,7 @@ _PARAMETER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
 
 
 @dataclass(frozen=True)
-class Part:
+class NamePart:
     """A piece of a name and where it stands."""
 
     text: str
@@ -58,9 +58,9 @@ class ScenarioName:
         params: parameter -> value as written.
     """
 
-    base: Part
-    variants: tuple[Part, ...]
-    params: dict[str, Part]
+    base: NamePart
+    variants: tuple[NamePart, ...]
+    params: dict[str, NamePart]
 
 
 def looks_like_path(text: str) -> bool:
@@ -84,7 +84,7 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
     """
     if not text.strip() or len(text) > MAX_NAME or not text.isprintable():
         found.add(Diagnostic("S508", "a scenario's name is one line of visible characters", start))
-        return ScenarioName(Part("", start), (), {})
+        return ScenarioName(NamePart("", start), (), {})
 
     question = len(text) if _is_file(text, folder) else _index(text, "?", 0)
     plus = question if _is_file(text[:question], folder) else _plus(text, question)
@@ -100,7 +100,7 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
         elif key in params:
             found.add(Diagnostic("S508", f"the parameter `{key}` is given twice", piece.span))
         else:
-            params[key] = Part(value, piece.span)
+            params[key] = NamePart(value, piece.span)
     return ScenarioName(_part(text, 0, plus, start), variants, params)
 
 
@@ -118,7 +118,7 @@ def _plus(text: str, question: int) -> int:
     return min(question, _index(text, "+", text.rfind("/", 0, question) + 1))
 
 
-def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tuple[Part, ...]:
+def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tuple[NamePart, ...]:
     """`text[begin:end]` split at the separator; nothing if `begin` lies behind `end`."""
     pieces = []
     while begin <= end:
@@ -128,8 +128,8 @@ def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tup
     return tuple(pieces)
 
 
-def _part(text: str, begin: int, end: int, start: Span) -> Part:
-    return Part(text[begin:end], start.shifted(begin, max(1, end - begin)))
+def _part(text: str, begin: int, end: int, start: Span) -> NamePart:
+    return NamePart(text[begin:end], start.shifted(begin, max(1, end - begin)))
 
 
 # -- bases and variants --------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ class Build:
     path: Path
     lineage: list[Ancestor]
     edits: list[Edit] = field(default_factory=list)
-    passed_on: list[Part] = field(default_factory=list)
+    passed_on: list[NamePart] = field(default_factory=list)
     own_variants: list[str] = field(default_factory=list)
 
     def copy(self) -> Build:
@@ -247,7 +247,7 @@ class Builder:
         stem = base.lineage[0].stem + "_"
         declared = root.entry("variant")
         if declared is not None and built.path.stem.startswith(stem):
-            variant = Part(built.path.stem.removeprefix(stem), declared.value_span())
+            variant = NamePart(built.path.stem.removeprefix(stem), declared.value_span())
             built.passed_on.append(variant)
             built.own_variants.append(variant.text)
 
@@ -346,7 +346,7 @@ class Builder:
 _OF_ANY: Final = re.compile(r"^of: *any\b", re.MULTILINE)
 
 
-def vary(builder: Builder, build: Build, variant: Part) -> None:
+def vary(builder: Builder, build: Build, variant: NamePart) -> None:
     """Apply a variant to what is built: the nearest file of that name, else one for any scenario.
 
     `<X>_V.yaml` comes first, then `<R>_V.yaml` of each scenario R that X is a variant of, then `V.yaml` with
@@ -383,7 +383,7 @@ def _name(build: Build, variant: str, file: Path | None) -> None:
     build.name = f"{build.name}+{variant}"
 
 
-def _direct(builder: Builder, build: Build, variant: Part) -> Path | None:
+def _direct(builder: Builder, build: Build, variant: NamePart) -> Path | None:
     library = builder.library
     for ancestor in build.lineage:
         for folder in dict.fromkeys((ancestor.folder, library.shipped)):
@@ -393,7 +393,7 @@ def _direct(builder: Builder, build: Build, variant: Part) -> Path | None:
     return None
 
 
-def _down_to(builder: Builder, build: Build, path: Path, variant: Part) -> list[Node]:
+def _down_to(builder: Builder, build: Build, path: Path, variant: NamePart) -> list[Node]:
     """The patches that lead from what is built to the variant in a file, in the order to apply them."""
     known = {ancestor.path for ancestor in build.lineage}
     patches: list[Node] = []
@@ -412,7 +412,7 @@ def _down_to(builder: Builder, build: Build, path: Path, variant: Part) -> list[
     return patches
 
 
-def _of_any(builder: Builder, build: Build, variant: Part) -> Node:
+def _of_any(builder: Builder, build: Build, variant: NamePart) -> Node:
     for folder in _folders(builder, build):
         path = builder.library.resolved(folder / f"{variant.text}.yaml", variant.span)
         if _is_of_any(path):
@@ -424,7 +424,7 @@ def _of_any(builder: Builder, build: Build, variant: Part) -> Node:
     raise builder.library.error("S503", message, variant.span, None if near else listed, near)
 
 
-def _variant_file(builder: Builder, build: Build, path: Path, variant: Part) -> Node:
+def _variant_file(builder: Builder, build: Build, path: Path, variant: NamePart) -> Node:
     root, kind = builder.read(path, variant.span)
     if kind != "variant":
         message = f"`{variant.text}` is no variant of `{build.name}`: {display_name(path)} is a {kind}"
@@ -476,7 +476,7 @@ class ResolvedFile:
         edits: what variants changed, in order.
     """
 
-    def __init__(self, builder: Builder, build: Build, given: Mapping[str, Part]) -> None:
+    def __init__(self, builder: Builder, build: Build, given: Mapping[str, NamePart]) -> None:
         self.name = build.name
         self.kind = build.kind
         self.tree = build.tree
@@ -503,7 +503,7 @@ class ResolvedFile:
         return tuple(part.text for part in self._build.passed_on)
 
     @property
-    def passed_on(self) -> tuple[Part, ...]:
+    def passed_on(self) -> tuple[NamePart, ...]:
         """The same, with the places where they are asked for."""
         return tuple(self._build.passed_on)
 
@@ -512,7 +512,7 @@ class ResolvedFile:
         """The variants for which there was a file of its own."""
         return tuple(self._build.own_variants)
 
-    def given(self, name: str) -> Part | None:
+    def given(self, name: str) -> NamePart | None:
         """A parameter's value as written behind `?`, with its place; None if it is not given."""
         return self._given.get(name)
 
@@ -577,7 +577,7 @@ class ResolvedFile:
             return (self.include(path),)
         span = node.value_span()
         files = self._builder.library.matching(node.value, _folder(node), span)
-        names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
+        names = [ScenarioName(NamePart(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
 
     def with_drawn_files(self) -> ResolvedFile:
@@ -623,7 +623,7 @@ class ResolvedFile:
                     found.append(file)
         return found
 
-    def varied(self, variant: Part) -> ResolvedFile | None:
+    def varied(self, variant: NamePart) -> ResolvedFile | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
         build = self._build.copy()
         try:
@@ -657,7 +657,7 @@ class ResolvedFile:
 
     def with_params(self, values: Mapping[str, tuple[str, Span]]) -> ResolvedFile:
         """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
-        given = {name: Part(text, span) for name, (text, span) in values.items()}
+        given = {name: NamePart(text, span) for name, (text, span) in values.items()}
         return ResolvedFile(self._builder, self._build.copy(), {**self._given, **given})
 
 
@@ -705,7 +705,7 @@ def _folder(part: Node) -> Path:
     return part.source.path.parent
 
 
-def _named_file(part: Part, folder: Path, source: Source, texts: Mapping[Path, Source]) -> Path:
+def _named_file(part: NamePart, folder: Path, source: Source, texts: Mapping[Path, Source]) -> Path:
     """The file that a name from outside means.
 
     Raises:

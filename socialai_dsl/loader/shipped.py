@@ -26,7 +26,7 @@ IDS: Final = {
 
 
 @dataclass(frozen=True)
-class Shipped:
+class ShippedScenario:
     """A scenario or suite that ships.
 
     Attributes:
@@ -41,12 +41,12 @@ class Shipped:
     parameters: dict[str, tuple[str, ...]]
 
 
-def catalogue() -> list[Shipped]:
+def catalogue() -> list[ShippedScenario]:
     """Everything that ships and can be played, those of the paper first, then those in folders."""
     documents = _documents()
     in_folders = [name for name, content in documents.items() if "/" in name and _stands_alone(content)]
     return [
-        Shipped(
+        ShippedScenario(
             name,
             " ".join(str(_own_or_inherited(name, "about") or "").split()),
             tuple(variants_of(name)),

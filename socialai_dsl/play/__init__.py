@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
-    from socialai_dsl.play.game import Played
+    from socialai_dsl.play.game import FinishedEpisode
     from socialai_dsl.play.screen import Episodes
 
 __all__ = ["play"]
 
 
-def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[Played]":
+def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[FinishedEpisode]":
     """Let a person at the terminal play; the episodes that were played to their end.
 
     Args:

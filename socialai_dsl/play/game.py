@@ -23,7 +23,7 @@ _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
 
 
 @dataclass(frozen=True)
-class Ended:
+class EpisodeEnd:
     """How an episode ended.
 
     Attributes:
@@ -37,7 +37,7 @@ class Ended:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class GameMoment:
     """A moment of an episode.
 
     Attributes:
@@ -56,11 +56,11 @@ class Moment:
     action: NDArray[np.int64] | None = None
     lines: tuple[DialogueLine, ...] = ()
     reward: float = 0.0
-    ended: Ended | None = None
+    ended: EpisodeEnd | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class FinishedEpisode:
     """An episode as it was played to its end.
 
     Attributes:
@@ -73,7 +73,7 @@ class Played:
     title: str
     actions: list[NDArray[np.int64]]
     reward: float
-    ended: Ended
+    ended: EpisodeEnd
 
     def __str__(self) -> str:
         """One line: which, how, after how many steps."""
@@ -104,7 +104,7 @@ class Game:
         self._env: Any = socialai_dsl.make(scenario).unwrapped
         self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
-        self._moments: list[Moment] = []
+        self._moments: list[GameMoment] = []
 
     def begin(self, title: str, reset: dict[str, Any]) -> None:
         """Start an episode with these arguments of `env.reset`.
@@ -114,7 +114,7 @@ class Game:
         """
         observation, info = self._env.reset(**reset)
         self.title = title
-        self._moments = [Moment(self._env.snapshot(), observation["image"], info.get("member"))]
+        self._moments = [GameMoment(self._env.snapshot(), observation["image"], info.get("member"))]
 
     def act(self, movement: str | None, sentence: str | None) -> None:
         """Play a step.
@@ -127,7 +127,7 @@ class Game:
         observation, reward, terminated, truncated, info = self._env.step(action)
         step = describe_step(self._program, action, len(self._moments), info["utterance"])
         self._moments.append(
-            Moment(
+            GameMoment(
                 self._env.snapshot(),
                 observation["image"],
                 info.get("member"),
@@ -147,7 +147,7 @@ class Game:
         return True
 
     @property
-    def now(self) -> Moment:
+    def now(self) -> GameMoment:
         """Where the game stands."""
         return self._moments[-1]
 
@@ -196,21 +196,21 @@ class Game:
             ]
         return lines
 
-    def played(self) -> Played | None:
+    def played(self) -> FinishedEpisode | None:
         """The episode, if it has ended."""
         ended = self.now.ended
         if ended is None:
             return None
         actions = [moment.action for moment in self._moments if moment.action is not None]
-        return Played(self.title, actions, self.now.reward, ended)
+        return FinishedEpisode(self.title, actions, self.now.reward, ended)
 
     def close(self) -> None:
         """Let the environment go."""
         self._env.close()
 
-    def _ended(self, info: dict[str, Any]) -> Ended:
+    def _ended(self, info: dict[str, Any]) -> EpisodeEnd:
         name = outcome_name(info)
-        return Ended(name, bool(info["success"]), self._endings[name].text)
+        return EpisodeEnd(name, bool(info["success"]), self._endings[name].text)
 
 
 def _abouts(loaded: Loaded, program: Playable) -> dict[str | None, str]:

@@ -18,7 +18,7 @@ from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.envs.view import ahead
-from socialai_dsl.play.game import Game, Played
+from socialai_dsl.play.game import FinishedEpisode, Game
 from socialai_dsl.render.canvas import INK
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.render.tiles import PALETTE
@@ -45,7 +45,7 @@ _STAND: Final = ("full_stop", "space")
 _NAMES: Final = {"left": "←", "right": "→", "up": "↑", "full_stop": "."}
 
 
-class PlayApp(App[list[Played]]):
+class PlayApp(App[list[FinishedEpisode]]):
     """A person's play, episode after episode.
 
     Args:
@@ -105,7 +105,7 @@ class PlayApp(App[list[Played]]):
         self.ansi_theme_dark = _TERMINAL
         self._game, self._episodes, self._practice = game, episodes, practice
         self._number = 0
-        self._done: list[Played] = []
+        self._done: list[FinishedEpisode] = []
         self.failure: Exception | None = None
 
     def compose(self) -> ComposeResult:

@@ -23,7 +23,7 @@ _ENDING_WIDTH: Final = 52
 
 
 @dataclass
-class Episode:
+class RecordedEpisode:
     """A recorded episode.
 
     Attributes:
@@ -88,7 +88,7 @@ def record(
     reset: dict[str, Any],
     meet: Callable[[], Sequence[Face]] = tuple,
     endings: Mapping[str, Ending] | None = None,
-) -> Episode:
+) -> RecordedEpisode:
     """Play one episode with given actions and record it.
 
     Args:
@@ -102,7 +102,7 @@ def record(
     """
     _, info = env.reset(**reset)
     cast = meet()
-    episode = Episode(f"{title}: {info['member']}" if "member" in info else title)
+    episode = RecordedEpisode(f"{title}: {info['member']}" if "member" in info else title)
     dialogue: list[DialogueLine] = []
     episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""], cast=cast))
     for t, action in enumerate(actions, start=1):
@@ -122,7 +122,7 @@ def record(
     return episode
 
 
-def _caption(episode: Episode, step: Step, ended: bool) -> list[str]:
+def _caption(episode: RecordedEpisode, step: Step, ended: bool) -> list[str]:
     lines = [f"step {step.t}   {step.action}"]
     if ended:
         verdict = "success" if episode.success else "no success"

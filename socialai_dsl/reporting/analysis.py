@@ -12,7 +12,7 @@ import pandas as pd
 
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, Run
-from socialai_dsl.reporting.records import Ending
+from socialai_dsl.reporting.records import EndingRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
     Estimate,
@@ -64,7 +64,7 @@ class Summary:
         }
         self.seeds = align(curves) if curves else None
         self.short = _too_short(condition, self.success, self.seeds)
-        self.endings: dict[str, Ending] = {e.outcome: e for figures in done for e in figures.endings}
+        self.endings: dict[str, EndingRecord] = {e.outcome: e for figures in done for e in figures.endings}
 
     @property
     def successes(self) -> frozenset[str]:

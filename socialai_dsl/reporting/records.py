@@ -75,7 +75,7 @@ class ExperimentRecord(_Record):
     runs: list[RunEntry]
 
 
-class Ending(_Record):
+class EndingRecord(_Record):
     """How test episodes ended, with the line of the scenario's file that says so."""
 
     outcome: str
@@ -107,7 +107,7 @@ class Figures(_Record):
     mean_length: float
     mean_return: float
     outcomes: dict[str, float] = Field(default_factory=dict)
-    endings: list[Ending] = Field(default_factory=list)
+    endings: list[EndingRecord] = Field(default_factory=list)
     rules: dict[str, float] = Field(default_factory=dict)
     replies: int = Field(0, ge=0)
     invalid_replies: int = Field(0, ge=0)

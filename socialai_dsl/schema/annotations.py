@@ -16,7 +16,7 @@ from socialai_dsl.schema.experiment import (
     Profile,
     Reference,
     Settings,
-    Tested,
+    Transfer,
 )
 from socialai_dsl.schema.scenario import (
     Belief,
@@ -88,13 +88,13 @@ CALLED: Final[dict[type, str]] = {
     Settings: "settings",
     Override: "an override",
     Profile: "a profile",
-    Tested: "a test",
+    Transfer: "a test",
     Reference: "a reference",
 }
 """How messages call what a model describes."""
 
 
-_OF_EXPERIMENTS: Final = (Experiment, Condition, Grid, Settings, Override, Profile, Tested, Reference)
+_OF_EXPERIMENTS: Final = (Experiment, Condition, Grid, Settings, Override, Profile, Transfer, Reference)
 
 
 def keys_of(model: type) -> list[str]:

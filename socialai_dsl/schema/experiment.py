@@ -45,7 +45,7 @@ class Reference(Model):
     source: str | None = Field(None, description="the source of the figure")
 
 
-class Tested(Model):
+class Transfer(Model):
     """A scenario that the trained agents play besides their own."""
 
     scenario: MemberName = Field(description="the scenario; the condition's `variants` apply to it as well")
@@ -57,7 +57,7 @@ def _is_mapping(value: Any) -> str:
 
 
 Test = Annotated[
-    Annotated[MemberName, Tag("word")] | Annotated[Tested, Tag("mapping")], Discriminator(_is_mapping)
+    Annotated[MemberName, Tag("word")] | Annotated[Transfer, Tag("mapping")], Discriminator(_is_mapping)
 ]
 
 

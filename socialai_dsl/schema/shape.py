@@ -29,7 +29,7 @@ _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in mode
 
 
 @dataclass
-class Repaired:
+class Repair:
     """A document that is changed into what was probably meant; its parts still know where they are written.
 
     Attributes:
@@ -66,7 +66,7 @@ class Repaired:
         return siblings if isinstance(siblings, dict) else None
 
 
-def fill_gaps(repaired: Repaired, bag: DiagnosticBag, path: DataPath = ()) -> None:
+def fill_gaps(repaired: Repair, bag: DiagnosticBag, path: DataPath = ()) -> None:
     """Report every key and list item without a value, and what a comma inside { } has cut off."""
     part = repaired.tree.at(path)
     if isinstance(part.children, dict):
@@ -78,9 +78,7 @@ def fill_gaps(repaired: Repaired, bag: DiagnosticBag, path: DataPath = ()) -> No
         fill_gaps(repaired, bag, (*path, key))
 
 
-def _join_cut_values(
-    repaired: Repaired, entries: dict[str, Node], path: DataPath, bag: DiagnosticBag
-) -> None:
+def _join_cut_values(repaired: Repair, entries: dict[str, Node], path: DataPath, bag: DiagnosticBag) -> None:
     before: str | None = None
     cut: dict[str, list[tuple[str, Node]]] = {}
     for key, part in list(entries.items()):
@@ -323,7 +321,7 @@ def model_of(
         parameters: `$name` that is left may stand for anything: that there is no such parameter has been said, or a
             scenario will give it.
     """
-    repaired = Repaired(tree.copy())
+    repaired = Repair(tree.copy())
     known = len(bag)
     made = _tried(model, repaired.tree.data)
     if made is None:
@@ -399,7 +397,7 @@ class _Report:
     def __init__(
         self,
         model: type[BaseModel],
-        repaired: Repaired,
+        repaired: Repair,
         bag: DiagnosticBag,
         partial: bool,
         parameters: bool,

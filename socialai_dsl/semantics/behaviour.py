@@ -56,7 +56,7 @@ from socialai_dsl.semantics.terms import (
     Measure,
     Read,
     ReadEach,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     all_of,
@@ -564,8 +564,8 @@ class _Planner:
         return found
 
     def _after(
-        self, rule: Rule, path: DataPath, when: Sited | None, address: str
-    ) -> tuple[int, Sited | None]:
+        self, rule: Rule, path: DataPath, when: SitedTerm | None, address: str
+    ) -> tuple[int, SitedTerm | None]:
         """From which turn on a rule holds; a number that is drawn becomes a condition on the clock."""
         place = (*path, "after")
         if rule.after is None:
@@ -583,10 +583,10 @@ class _Planner:
         clock = Read(Type("int", 0, resolver.symbols.scenario.horizon), f"{self.played.member}.clock")
         late = Compare("<=", term, clock)
         if when is None:
-            return 0, Sited(late, f"{self.played.member}/{address}.after", resolver.findings.at(place))
-        return 0, Sited(all_of([late, when.term]), when.site, when.span)
+            return 0, SitedTerm(late, f"{self.played.member}/{address}.after", resolver.findings.at(place))
+        return 0, SitedTerm(all_of([late, when.term]), when.site, when.span)
 
-    def condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
+    def condition(self, path: DataPath, raw: object, address: str) -> SitedTerm | None:
         """The condition at a path, of an entry with this address; None if none is written."""
         if raw is None:
             return None
@@ -666,7 +666,7 @@ class _Planner:
             say=self.spoken.lines.get(path),
         )
 
-    def _duration(self, path: DataPath, raw: object, site: str) -> tuple[int | None, Sited | None]:
+    def _duration(self, path: DataPath, raw: object, site: str) -> tuple[int | None, SitedTerm | None]:
         """For how many turns an entry lasts; a number that is not known becomes a condition on the clock."""
         if raw is None:
             return None, None
@@ -691,7 +691,7 @@ class _Planner:
             return None, None
         clock = Read(Type("int", 0, horizon), f"{self.played.member}.clock")
         lasted = Compare("<=", term, clock)
-        return None, Sited(lasted, f"{self.played.member}/{site}", findings.at(path))
+        return None, SitedTerm(lasted, f"{self.played.member}/{site}", findings.at(path))
 
 
 # -- what belongs to nobody's frame: rules of the world ------------------------------------------------------
@@ -716,7 +716,7 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
         resolver.findings.error(
             "S105", "a rule of the world needs `cause`, `set` or `reward`: what it does", span
         )
-    when: Sited | None = None
+    when: SitedTerm | None = None
     with surviving():
         if rule.when is not None:
             when = resolver.sited(rule.when, BOOL, _world_scope((*path, "when"), f"{name}.when"))
@@ -762,7 +762,7 @@ def _world_scope(path: DataPath, site: str) -> Scope:
     return at_every_step(reset_scope(path, site))
 
 
-def requirements(resolver: Resolver) -> Iterator[Sited]:
+def requirements(resolver: Resolver) -> Iterator[SitedTerm]:
     """The conditions on a drawn room."""
     for i, raw in enumerate(resolver.symbols.scenario.require):
         with surviving():

@@ -10,12 +10,12 @@ from socialai_dsl.semantics import texts
 from socialai_dsl.semantics.plans import BeliefPlan
 from socialai_dsl.semantics.resolver import Declaration, Resolver
 from socialai_dsl.semantics.scope import Draws, Scope, is_nothing, reset_scope, surviving
-from socialai_dsl.semantics.terms import BOOL, Const, Sited, changed
+from socialai_dsl.semantics.terms import BOOL, Const, SitedTerm, changed
 from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, on_hearing, with_slots
 from socialai_dsl.source import DataPath
 
 
-class Believed:
+class BeliefResolver:
     """A belief of a member of the cast, and where it is written."""
 
     def __init__(self, resolver: Resolver, member: str, key: str, belief: Belief) -> None:
@@ -67,7 +67,7 @@ class Believed:
         for when, value in self._sources():
             yield BeliefPlan(self._member, self.register, value, when, forget, lasts)
 
-    def _sources(self) -> Iterator[tuple[Sited | None, Sited]]:
+    def _sources(self) -> Iterator[tuple[SitedTerm | None, SitedTerm]]:
         belief = self._belief
         if belief.of is not None:
             scope = replace(reset_scope((), self._site, self._member), at_reset=False)
@@ -78,7 +78,9 @@ class Believed:
                 path, site = (*self._path, "from", i), f"{self._site}.from[{i}]"
                 yield self._source(source, path, site, self._scope(path, site, bool(source.hears)))
 
-    def _source(self, source: Source, path: DataPath, site: str, scope: Scope) -> tuple[Sited | None, Sited]:
+    def _source(
+        self, source: Source, path: DataPath, site: str, scope: Scope
+    ) -> tuple[SitedTerm | None, SitedTerm]:
         resolver, findings = self._resolver, self._resolver.findings
         of = scope.at((*path, "of"), site)
         value = texts.value_for(resolver, self.register, source.of, of)
@@ -100,7 +102,7 @@ class Believed:
             found.append(texts.heard_at(resolver, raw, scope.at(place, scope.draws.site)))
         return found
 
-    def _forgetting(self) -> tuple[Sited | None, int]:
+    def _forgetting(self) -> tuple[SitedTerm | None, int]:
         """The condition on which it is forgotten, or after how many turns (0: never)."""
         if self._belief.forget is None:
             return None, 0

@@ -22,7 +22,7 @@ from socialai_dsl.semantics import (
     tables,
 )
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
-from socialai_dsl.semantics.free_cells import Known, check_absences, check_placements
+from socialai_dsl.semantics.free_cells import PartialEvaluation, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import (
     CheckedScenario,
@@ -59,8 +59,8 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     Const,
     Line,
-    Quantified,
-    Sited,
+    Quantification,
+    SitedTerm,
     Type,
     walk,
 )
@@ -160,7 +160,7 @@ class _Entry:
                 raise self._findings.fail("S107", message, self._findings.places.key_span((*self._path, key)))
         return given[0]
 
-    def _condition(self, path: DataPath, raw: Expression) -> tuple[Sited, tuple[Drawn, ...]]:
+    def _condition(self, path: DataPath, raw: Expression) -> tuple[SitedTerm, tuple[Drawn, ...]]:
         """A condition, and what it alone asks about the step before."""
         remembered = self._resolver.registers.remembered
         asked = len(remembered)
@@ -218,14 +218,14 @@ def _outcomes_called(word: str, outcomes: tuple[OutcomePlan, ...]) -> tuple[str,
 def _values(drawn: Drawn) -> tuple[int, ...]:
     """The values that a draw has in every room, as often as they weigh; none if that depends on other draws."""
     term = drawn.value.term
-    if not isinstance(term, Quantified) or term.op != "pick" or term.cells:
+    if not isinstance(term, Quantification) or term.op != "pick" or term.cells:
         return ()
     found = []
     for item in term.items:
         kept = (
             1
             if term.condition is None
-            else Known(variables={term.variable: item.value}).value(term.condition)
+            else PartialEvaluation(variables={term.variable: item.value}).value(term.condition)
         )
         if kept is None:
             return ()
@@ -657,7 +657,7 @@ class _Run:
                 name = outcome.id or f"{kind}@{line}"
                 yield OutcomePlan(name, kind == "success", percent, condition, graded)
 
-    def _reward(self, raw: Expression, path: DataPath) -> tuple[int, Sited | None]:
+    def _reward(self, raw: Expression, path: DataPath) -> tuple[int, SitedTerm | None]:
         """Per cent of the success reward, or what computes it."""
         reward = self.resolver.sited(raw, INT, at_every_step(reset_scope(path)))
         if not isinstance(reward.term, Const):

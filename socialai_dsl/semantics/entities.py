@@ -49,9 +49,9 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     Const,
     ObjectType,
-    Quantified,
+    Quantification,
     Read,
-    Sited,
+    SitedTerm,
     Term,
     Type,
 )
@@ -425,9 +425,9 @@ def _declare_file(resolver: Resolver, name: str) -> None:
     words = tuple(file.npc for file in files)
     type_ = Type("text", 0, len(words) - 1, words)
     values = tuple(Const(type_, value) for value in range(len(words)))
-    drawn = Quantified(type_, "pick", "each", values, None)
+    drawn = Quantification(type_, "pick", "each", values, None)
     span = resolver.findings.places.key_span(("cast", name, "one_of"))
-    resolver.registers.draw_file(name, Sited(drawn, f"cast.{name}.one_of", span))
+    resolver.registers.draw_file(name, SitedTerm(drawn, f"cast.{name}.one_of", span))
 
 
 def declare_name(resolver: Resolver, name: str) -> None:
@@ -444,7 +444,7 @@ def declare_name(resolver: Resolver, name: str) -> None:
             resolver.registers.known(f"{name}.name", term)
         else:
             span = resolver.findings.places.key_span(("cast", name, "one_of"))
-            resolver.registers.put(f"{name}.name", Sited(term, f"cast.{name}.name", span))
+            resolver.registers.put(f"{name}.name", SitedTerm(term, f"cast.{name}.name", span))
         return
     written = [(symbols.member_path(name, "name", which), raw) for which, raw in enumerate(raws)]
     (path, raw), *others = written

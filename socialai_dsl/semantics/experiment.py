@@ -20,7 +20,7 @@ from socialai_dsl.schema.experiment import (
     Profile,
     Reference,
     Settings,
-    Tested,
+    Transfer,
     one_setting,
 )
 from socialai_dsl.source import DataPath, Node
@@ -362,5 +362,5 @@ def _on_top(draft: _Draft, below: Sequence[_Layer], above: Sequence[_Layer]) -> 
     )
 
 
-def _tested(test: str | Tested) -> tuple[str, Reference | None]:
+def _tested(test: str | Transfer) -> tuple[str, Reference | None]:
     return (test, None) if isinstance(test, str) else (test.scenario, test.reference)

@@ -70,13 +70,13 @@ def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
 
 def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
     """The value of a term that reads only the size of the room and the cell; raises UnknownError for others."""
-    found = Known(size, here).value(term)
+    found = PartialEvaluation(size, here).value(term)
     if found is None:
         raise UnknownError(str(term))
     return found
 
 
-class Known:
+class PartialEvaluation:
     """What is known when a term is asked for its value; None stands for what is not.
 
     Attributes:
@@ -451,7 +451,7 @@ def _taken_away(term: Term) -> int:
         case terms.Not(arg=terms.Test(subject=None, name=name)) if name in _TAKES_AWAY:
             return _TAKES_AWAY[name]
         case terms.Not(
-            arg=terms.Quantified(op="any", items=items, condition=terms.Test(subject=None, name=name))
+            arg=terms.Quantification(op="any", items=items, condition=terms.Test(subject=None, name=name))
         ) if name in _TAKES_AWAY:
             return _TAKES_AWAY[name] * len(items)
     raise UnknownError
@@ -583,7 +583,7 @@ def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) 
     yield from inside if overlap and region.name in EXACT else (cell for cell in inside if cell not in built)
 
 
-class _DrawnRoom(Known):
+class _DrawnRoom(PartialEvaluation):
     """A room while it is drawn."""
 
     def __init__(self, size: Size, generator: Random, cells: _CellsOf) -> None:
@@ -663,7 +663,7 @@ class _DrawnRoom(Known):
                 return self._distance(self._cell(one), self._cell(other))
             case terms.Test(name=name, subject=subject, object=target):
                 return self._related(name, self.here if subject is None else self._cell(subject), target)
-            case terms.Quantified(cells=False):
+            case terms.Quantification(cells=False):
                 return self._quantified(term)
         return super().value(term)
 
@@ -690,7 +690,7 @@ class _DrawnRoom(Known):
                 return None if cell[0] == other[0] or cell[1] == other[1] else 0
         return None
 
-    def _quantified(self, term: terms.Quantified) -> int | None:
+    def _quantified(self, term: terms.Quantification) -> int | None:
         truths = [(item.value, self._holds_for(term, item.value)) for item in term.items]
         match term.op:
             case "any" | "all":
@@ -708,7 +708,7 @@ class _DrawnRoom(Known):
                 return fitting[0] if term.op == "first" else self._generator.choice(fitting)
         return None
 
-    def _holds_for(self, term: terms.Quantified, value: int) -> int | None:
+    def _holds_for(self, term: terms.Quantification, value: int) -> int | None:
         if term.condition is None:
             return 1
         outer = self.variables.get(term.variable)

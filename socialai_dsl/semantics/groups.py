@@ -35,10 +35,10 @@ from socialai_dsl.semantics.terms import (
     Const,
     FieldOf,
     Here,
-    Quantified,
+    Quantification,
     Read,
     Select,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     Variable,
@@ -284,7 +284,7 @@ def made(
     scope: Scope,
     ordinal: int = 0,
     to: Term | None = None,
-) -> Quantified:
+) -> Quantification:
     """The term of a quantifier."""
     if members.bounds is not None:
         inside = between(Variable(members.type, variable), *members.bounds)
@@ -298,7 +298,7 @@ def made(
     cells = members.type.kind == "cell"
     if cells and op == "count":
         type_ = Type("int", 0, _MOST_CELLS)
-    return Quantified(type_, op, variable, members.items, condition, to, ordinal, site, cells)
+    return Quantification(type_, op, variable, members.items, condition, to, ordinal, site, cells)
 
 
 def any_member(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
@@ -413,7 +413,7 @@ def values_of(resolver: Resolver, term: Term) -> frozenset[int]:
             return frozenset({value})
         case Read(path=path) if (drawn := resolver.registers.drawn_at_reset(path)) is not None:
             return values_of(resolver, drawn)
-        case Quantified(op="pick" | "first" | "nearest", items=items):
+        case Quantification(op="pick" | "first" | "nearest", items=items):
             return frozenset(item.value for item in items)
         case Select(values=values, default=default):
             return frozenset().union(*(values_of(resolver, value) for value in (*values, default)))
@@ -469,7 +469,7 @@ def _values_named(resolver: Resolver, node: ast.Expr) -> frozenset[int]:
 
 
 @dataclass(frozen=True)
-class Acts:
+class ActSequence:
     """A sequence or a memory: acts in a row, each a move and an utterance in registers of their own."""
 
     path: str
@@ -504,10 +504,10 @@ def declare(resolver: Resolver, name: str, model: Sequence) -> None:
     moves = tuple(Const(ACTION, ACTION.words.index(move)) for move in model.moves)
     for k in range(model.sequence):
         element = f"let.{name}[{k}]"
-        move = moves[0] if len(moves) == 1 else Quantified(ACTION, "pick", "each", moves, None)
-        resolver.registers.put(f"{element}.move", Sited(move, f"{element}.move", span))
+        move = moves[0] if len(moves) == 1 else Quantification(ACTION, "pick", "each", moves, None)
+        resolver.registers.put(f"{element}.move", SitedTerm(move, f"{element}.move", span))
         utterance = _utterance(utterance_type(resolver), model.utterance.chance if model.utterance else 0.0)
-        resolver.registers.put(f"{element}.utterance", Sited(utterance, f"{element}.utterance", span))
+        resolver.registers.put(f"{element}.utterance", SitedTerm(utterance, f"{element}.utterance", span))
 
 
 def _utterance(type_: Type, chance: float) -> Term:
@@ -517,7 +517,7 @@ def _utterance(type_: Type, chance: float) -> Term:
         return silence
     said = tuple(Const(type_, value) for value in range(1, type_.high + 1) if type_.words[value])
     return Select(
-        type_, (Chance(chance, 0),), (Quantified(type_, "pick", "each", said, None, ordinal=1),), silence
+        type_, (Chance(chance, 0),), (Quantification(type_, "pick", "each", said, None, ordinal=1),), silence
     )
 
 
@@ -525,7 +525,7 @@ def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
     """The memories of the agent's acts."""
     for name, model in resolver.symbols.scenario.memory.items():
         path = ("memory", name, "while")
-        open_: Sited | None = None
+        open_: SitedTerm | None = None
         with surviving():
             if model.while_ is not None:
                 open_ = resolver.sited(model.while_, BOOL, at_every_step(reset_scope(path)))
@@ -543,7 +543,7 @@ def performs(frame: Frame) -> bool:
 # -- what is used --------------------------------------------------------------------------------------------------
 
 
-def acts_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> Acts | None:
+def acts_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> ActSequence | None:
     """The sequence or memory that an expression names; None if it names something else."""
     if not isinstance(node, ast.Name) or node.id in scope.variables:
         return None
@@ -552,20 +552,20 @@ def acts_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> Acts | None:
         return _in_slot(resolver, frame.member, node.id, frame.looked_at)
     model = scenario.let.get(node.id)
     if isinstance(model, Sequence):
-        return Acts(f"let.{node.id}", model.sequence, utterance_type(resolver), remembered=False)
+        return ActSequence(f"let.{node.id}", model.sequence, utterance_type(resolver), remembered=False)
     if node.id in scenario.memory:
         length = scenario.memory[node.id].last
-        return Acts(f"memory.{node.id}", length, utterance_type(resolver), remembered=True)
+        return ActSequence(f"memory.{node.id}", length, utterance_type(resolver), remembered=True)
     return None
 
 
-def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Acts:
+def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> ActSequence:
     """The sequence that fills a slot, the same in every file of a `one_of`."""
     symbols, findings = resolver.symbols, resolver.findings
     alternatives = symbols.alternatives[member]
     if looked_at or not all(slot in alternative.with_ for alternative in alternatives):
         raise FailedError  # a slot that nobody fills is reported where it is left empty
-    found: list[Acts] = []
+    found: list[ActSequence] = []
     for which, alternative in enumerate(alternatives):
         path = symbols.with_path(member, slot, which)
         node = findings.expression(path, alternative.with_[slot])
@@ -582,7 +582,7 @@ def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Act
     return found[0]
 
 
-def same(resolver: Resolver, left: Acts, right: Acts, node: ast.Compare, scope: Scope) -> Term:
+def same(resolver: Resolver, left: ActSequence, right: ActSequence, node: ast.Compare, scope: Scope) -> Term:
     """Whether two rows of acts are alike, element by element; false while a memory is not full."""
     if left.length != right.length:
         message = f"`{quoted(node.left)}` has {left.length} acts, `{quoted(node.right)}` has {right.length}"

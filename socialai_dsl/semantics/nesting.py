@@ -9,7 +9,7 @@ from socialai_dsl.schema.scenario import Step
 from socialai_dsl.semantics.plans import NestedSteps, StepPlan
 from socialai_dsl.semantics.resolver import INT, Resolver
 from socialai_dsl.semantics.scope import Draws, FailedError, PlayedFrame, Scope, dotted
-from socialai_dsl.semantics.terms import Const, Sited
+from socialai_dsl.semantics.terms import Const, SitedTerm
 from socialai_dsl.source import DataPath
 
 
@@ -23,7 +23,7 @@ class NestedPlanner:
 
     resolver: Resolver
     played: PlayedFrame
-    condition: Callable[[DataPath, object, str], Sited | None]
+    condition: Callable[[DataPath, object, str], SitedTerm | None]
     steps: Sequence[StepPlan]
 
     def plan(self) -> tuple[int | NestedSteps, ...]:

@@ -11,8 +11,8 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.schema.scenario import Register, Scenario
 from socialai_dsl.semantics import groups, hands
-from socialai_dsl.semantics.believing import Believed
-from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
+from socialai_dsl.semantics.believing import BeliefResolver
+from socialai_dsl.semantics.plans import Activity, BeliefPlan, ComputedStatus, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -33,7 +33,7 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Read,
     Select,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     arithmetic,
@@ -331,7 +331,7 @@ def _initial(resolver: Resolver, objects: Objects) -> dict[int, int | Read]:
         states = objects.type.states
         type_ = Type("status", 0, len(states) - 1, states)
         value = Select(type_, (condition,), (Const(type_, status),), Const(type_, objects.type.initial))
-        sited = Sited(value, scope.draws.site, resolver.findings.at((*base, key)))
+        sited = SitedTerm(value, scope.draws.site, resolver.findings.at((*base, key)))
         found[entity] = resolver.registers.put(f"{objects.called(index)}.initial", sited)
     return found
 
@@ -352,9 +352,9 @@ def _status(
 # -- computed ------------------------------------------------------------------------------------------------------
 
 
-def computed(resolver: Resolver) -> tuple[Computed, ...]:
+def computed(resolver: Resolver) -> tuple[ComputedStatus, ...]:
     """Statuses that follow from conditions, each after those it reads."""
-    found: dict[int, Computed] = {}
+    found: dict[int, ComputedStatus] = {}
     for objects in resolver.symbols.objects.values():
         for key, left_for in _COMPUTED.items():
             with surviving():
@@ -363,7 +363,9 @@ def computed(resolver: Resolver) -> tuple[Computed, ...]:
     return tuple(_in_order(resolver, found))
 
 
-def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | None) -> Iterator[Computed]:
+def _computed(
+    resolver: Resolver, objects: Objects, key: str, left_for: str | None
+) -> Iterator[ComputedStatus]:
     raw = getattr(resolver.symbols.scenario.objects[objects.name], key)
     if raw is None:
         return
@@ -374,10 +376,12 @@ def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | No
     for index, entity in enumerate(objects.numbers):
         scope = object_scope(objects, index, path, key, at_reset=False)
         message = f"`{key}` follows from how things are, so nothing can be drawn in it"
-        yield Computed(entity, on, off, resolver.undrawn(resolver.sited(raw, BOOL, scope), message))
+        yield ComputedStatus(entity, on, off, resolver.undrawn(resolver.sited(raw, BOOL, scope), message))
 
 
-def _add(resolver: Resolver, found: dict[int, Computed], one: Computed, objects: Objects, key: str) -> None:
+def _add(
+    resolver: Resolver, found: dict[int, ComputedStatus], one: ComputedStatus, objects: Objects, key: str
+) -> None:
     span = resolver.findings.places.key_span(("objects", objects.name, key))
     if one.entity in found:
         raise resolver.findings.fail("S107", "only one status of an object can be computed", span)
@@ -387,11 +391,11 @@ def _add(resolver: Resolver, found: dict[int, Computed], one: Computed, objects:
     found[one.entity] = one
 
 
-def _in_order(resolver: Resolver, found: dict[int, Computed]) -> Iterator[Computed]:
+def _in_order(resolver: Resolver, found: dict[int, ComputedStatus]) -> Iterator[ComputedStatus]:
     done: set[int] = set()
     path: list[int] = []
 
-    def visit(entity: int) -> Iterator[Computed]:
+    def visit(entity: int) -> Iterator[ComputedStatus]:
         if entity in done or entity not in found:
             return
         if entity in path:
@@ -432,7 +436,7 @@ def declare(resolver: Resolver) -> None:
     for name, member in resolver.symbols.cast.items():
         for key, belief in member.beliefs.items():
             with surviving():
-                resolver.registers.declare(Believed(resolver, name, key, belief).declaration())
+                resolver.registers.declare(BeliefResolver(resolver, name, key, belief).declaration())
 
 
 def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
@@ -441,7 +445,7 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
         for key, belief in member.beliefs.items():
             with surviving():
                 if register_of(name, key) in resolver.registers:
-                    yield from Believed(resolver, name, key, belief).plans()
+                    yield from BeliefResolver(resolver, name, key, belief).plans()
 
 
 def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:

@@ -12,7 +12,7 @@ from socialai_dsl.semantics.terms import (
     Read,
     ReadEach,
     Readings,
-    Sited,
+    SitedTerm,
     Term,
     Type,
 )
@@ -123,10 +123,10 @@ class Assignment:
     """
 
     path: str
-    value: Sited
+    value: SitedTerm
     target: ReadEach | None = None
     key_site: str = ""
-    only: Sited | None = None
+    only: SitedTerm | None = None
     each: bool = False
 
     @property
@@ -145,7 +145,7 @@ class RulePlan:
     site: str
     span: Span
     hears: tuple[Pattern, ...] = ()
-    when: Sited | None = None
+    when: SitedTerm | None = None
     after: int = 0
     chance: float | None = None
     once: bool = False
@@ -191,10 +191,10 @@ class StepPlan:
     activity: Activity
     span: Span
     place: str = ""
-    when: Sited | None = None
-    until: Sited | None = None
+    when: SitedTerm | None = None
+    until: SitedTerm | None = None
     duration: int | None = None
-    lasted: Sited | None = None
+    lasted: SitedTerm | None = None
     sets: tuple[Assignment, ...] = ()
     causes: tuple[Effect, ...] = ()
     say: Line | None = None
@@ -219,9 +219,9 @@ class NestedSteps:
     body: tuple[int | NestedSteps, ...]
     rounds: int
     register: str
-    when: Sited | None = None
-    going: Sited | None = None
-    until: Sited | None = None
+    when: SitedTerm | None = None
+    going: SitedTerm | None = None
+    until: SitedTerm | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +278,7 @@ class Drawn:
 
     path: str
     type: Type
-    value: Sited
+    value: SitedTerm
     nothing: int | None = None
 
 
@@ -292,7 +292,7 @@ class Coloring:
     site: str
     number: int
     span: Span
-    value: Sited | None = None
+    value: SitedTerm | None = None
     distinct_from: tuple[int, ...] = ()
     when: Term | None = None
 
@@ -304,7 +304,7 @@ class Facing:
     entity: int
     site: str
     span: Span
-    value: Sited | None = None
+    value: SitedTerm | None = None
     toward: Term | None = None
     when: Term | None = None
 
@@ -364,8 +364,8 @@ class OutcomePlan:
     name: str
     success: bool
     percent: int
-    condition: Sited
-    graded: Sited | None = None
+    condition: SitedTerm
+    graded: SitedTerm | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,7 +390,7 @@ class LookPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class Computed:
+class ComputedStatus:
     """A status that follows from a condition: `on` while it holds; `off` once it stops holding.
 
     An object that is in `on` while the condition is false becomes `off`; in any other status it is left alone.
@@ -399,7 +399,7 @@ class Computed:
     entity: int
     on: int
     off: int
-    condition: Sited
+    condition: SitedTerm
 
 
 @dataclass(frozen=True, slots=True)
@@ -412,9 +412,9 @@ class BeliefPlan:
 
     member: str
     path: str
-    value: Sited
-    when: Sited | None
-    forget: Sited | None = None
+    value: SitedTerm
+    when: SitedTerm | None
+    forget: SitedTerm | None = None
     lasts: int = 0
 
 
@@ -429,7 +429,7 @@ class MemoryPlan:
     path: str
     length: int
     utterances: Type
-    open: Sited | None
+    open: SitedTerm | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -447,7 +447,7 @@ class PropertyPlan:
     text: str
     site: str
     span: Span
-    condition: Sited | None = None
+    condition: SitedTerm | None = None
     goals: tuple[str, ...] = ()
     remembered: tuple[Drawn, ...] = ()
     share: float | None = None
@@ -470,7 +470,7 @@ class ProbePlan:
 
     name: str
     span: Span
-    when: Sited | None
+    when: SitedTerm | None
     ask: tuple[str | Drawn, ...]
     answer: Drawn
     answers: tuple[tuple[str | Drawn, ...], ...]
@@ -515,11 +515,11 @@ class CheckedScenario:
     picture_before_npcs: bool
     names_shown: bool
     own_voice: bool
-    computed: tuple[Computed, ...] = ()
+    computed: tuple[ComputedStatus, ...] = ()
     remembered: tuple[Drawn, ...] = ()
     memories: tuple[MemoryPlan, ...] = ()
     rules: tuple[RulePlan, ...] = ()
-    require: tuple[Sited, ...] = ()
+    require: tuple[SitedTerm, ...] = ()
     egocentric: bool = False
     beliefs: tuple[BeliefPlan, ...] = ()
     slope: int = 900

@@ -20,7 +20,7 @@ from socialai_dsl.semantics.terms import (
     Logic,
     ObjectType,
     Select,
-    Sited,
+    SitedTerm,
     Term,
     draws,
     is_own_noun,
@@ -397,22 +397,22 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
             findings.warning("W314", "this outcome can never hold", outcome.condition.span, hint=why)
 
 
-def _by_place(found: Iterable[tuple[Span, Sited]]) -> Iterator[tuple[Span, list[Sited]]]:
+def _by_place(found: Iterable[tuple[Span, SitedTerm]]) -> Iterator[tuple[Span, list[SitedTerm]]]:
     """Conditions by the place they are written at: several members may follow one frame."""
-    places: dict[Span, list[Sited]] = {}
+    places: dict[Span, list[SitedTerm]] = {}
     for span, condition in found:
         places.setdefault(span, []).append(condition)
     yield from places.items()
 
 
-def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     in_frames = (rule for frame in checked.frames for rule in frame.rules)
     for rule in (*in_frames, *checked.rules):
         if rule.when is not None:
             yield rule.when.span, rule.when
 
 
-def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     for frame in checked.frames:
         nested = every(NestedSteps, frame.nesting)
         asked = [step.when for step in frame.steps] + [
@@ -421,20 +421,20 @@ def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, Sited
         yield from ((condition.span, condition) for condition in asked if condition is not None)
 
 
-def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     for frame in checked.frames:
         for step in frame.steps:
             if step.until is not None:
                 yield step.until.span, step.until
 
 
-def _those(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+def _those(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     """The conditions in `those(...)`, of each of the group."""
     for item in every(plans.Assignment, checked):
         if item.only is not None:
             yield item.only.span, item.only
     for effect in every(Effect, checked):
-        yield from ((effect.span, Sited(only, effect.site, effect.span)) for only in effect.only)
+        yield from ((effect.span, SitedTerm(only, effect.site, effect.span)) for only in effect.only)
 
 
 class Possible:
@@ -444,7 +444,7 @@ class Possible:
         self._checked = checked
         self._statuses = _Statuses(checked)
 
-    def never(self, conditions: Sequence[Sited]) -> str | None:
+    def never(self, conditions: Sequence[SitedTerm]) -> str | None:
         """Why none of these conditions can hold; None if one of them may.
 
         What is false as it is written, such as a parameter that switches a rule off, is meant to be.
@@ -456,7 +456,7 @@ class Possible:
             why = why or self._why(condition.term)
         return why
 
-    def always(self, conditions: Sequence[Sited]) -> bool:
+    def always(self, conditions: Sequence[SitedTerm]) -> bool:
         """Whether none of these conditions can be false, and that not as they are written."""
         asked = [condition.term for condition in conditions]
         return not all(isinstance(term, Const) for term in asked) and not any(
@@ -475,7 +475,7 @@ class Possible:
                 return (all if every else any)(self._may(arg, wanted) for arg in args)
             case terms.Compare():
                 return self._may_compare(term, wanted)
-            case terms.Quantified(op="any" | "all" as op, items=items, condition=condition, cells=False):
+            case terms.Quantification(op="any" | "all" as op, items=items, condition=condition, cells=False):
                 if not items:
                     return (op == "all") is wanted
                 if (op == "any") is wanted and condition is not None:
@@ -536,7 +536,7 @@ class Possible:
                 return next((why for arg in args if not self._may(arg) and (why := self._why(arg))), None)
             case terms.Logic(args=args):
                 return next((why for arg in args if (why := self._why(arg))), None)
-            case terms.Quantified(condition=condition, items=items) if condition is not None and items:
+            case terms.Quantification(condition=condition, items=items) if condition is not None and items:
                 return self._why(condition)
             case terms.Compare(left=left, right=right) if not isinstance(left, Const) or not isinstance(
                 right, Const

@@ -11,7 +11,7 @@ from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import FailedError, Scope, at_every_step, reset_scope, spoken, surviving
-from socialai_dsl.semantics.terms import BOOL, Sited, Term, walk
+from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term, walk
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
@@ -69,9 +69,9 @@ class _Entry:
         span = self._findings.places.key_span(self._path)
         return ProbePlan(self._name, span, when, ask, answer, answers, own)
 
-    def _parts(self) -> tuple[Sited | None, Text, Drawn, tuple[Text, ...]]:
+    def _parts(self) -> tuple[SitedTerm | None, Text, Drawn, tuple[Text, ...]]:
         """When, question, answer and answers, after the mistakes in each of them have been reported."""
-        when: Sited | None = None
+        when: SitedTerm | None = None
         ask: Text | None = None
         answers: tuple[Text, ...] | None = None
         fine = False
@@ -87,7 +87,7 @@ class _Entry:
             raise FailedError
         return when, ask, answer, answers
 
-    def _condition(self, raw: Expression) -> Sited:
+    def _condition(self, raw: Expression) -> SitedTerm:
         return self._undrawn(self._resolver.sited(raw, BOOL, self._scope((*self._path, "when"))))
 
     def _answer(self) -> Drawn:
@@ -96,7 +96,9 @@ class _Entry:
         node = self._findings.expression(path, self._entry.answer)
         scope = self._scope(path)
         term = sayable(self._resolver, node, scope, or_condition=True)
-        return self._value("answer", self._undrawn(Sited(term, scope.draws.site, self._findings.at(path))))
+        return self._value(
+            "answer", self._undrawn(SitedTerm(term, scope.draws.site, self._findings.at(path)))
+        )
 
     def _text(self, part: str, path: DataPath, raw: str) -> Text:
         """The pieces of a text and the values in it."""
@@ -105,7 +107,7 @@ class _Entry:
         pieces: list[str | Drawn] = []
         for piece in parts(self._resolver, text, scope):
             if isinstance(piece, Term):
-                sited = self._undrawn(Sited(piece, scope.draws.site, self._findings.at(path)))
+                sited = self._undrawn(SitedTerm(piece, scope.draws.site, self._findings.at(path)))
                 pieces.append(self._value(f"{part}[{len(pieces)}]", sited))
             else:
                 pieces.append(piece)
@@ -168,7 +170,7 @@ class _Entry:
             message = f"`{self._name}` has only one answer, so nobody is asked"
             self._findings.warning("W404", message, span, hint=_KNOWN_BEFOREHAND)
 
-    def _value(self, part: str, sited: Sited) -> Drawn:
+    def _value(self, part: str, sited: SitedTerm) -> Drawn:
         """A value with a register of its own."""
         type_ = sited.term.type
         if max(abs(type_.low), abs(type_.high)) > _LARGEST:
@@ -180,6 +182,6 @@ class _Entry:
     def _scope(self, path: DataPath) -> Scope:
         return at_every_step(reset_scope(path))
 
-    def _undrawn(self, sited: Sited) -> Sited:
+    def _undrawn(self, sited: SitedTerm) -> SitedTerm:
         """The same, in which nothing is drawn: who asks changes nothing."""
         return self._resolver.undrawn(sited, "a probe draws nothing itself")

@@ -53,7 +53,7 @@ from socialai_dsl.semantics.terms import (
     ReadEach,
     Sees,
     Select,
-    Sited,
+    SitedTerm,
     Speaker,
     Term,
     Test,
@@ -226,7 +226,7 @@ def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Sc
         message = "`prev` asks how things were, so nothing can be drawn in it"
         raise resolver.fail("S211", message, node, scope, hint="draw it in `let`, and use that")
     site = f"{scope.draws.site}.prev[{node.at}]"
-    return resolver.registers.remember(Sited(term, site, resolver.findings.node(scope.path, node)))
+    return resolver.registers.remember(SitedTerm(term, site, resolver.findings.node(scope.path, node)))
 
 
 def _listener(resolver: Resolver, node: ast.Call, scope: Scope) -> None:
@@ -450,7 +450,7 @@ class ScenarioResolver(Resolver):
                     "S204", f"`{quoted(node)}` is a choice of several, here one is needed", node, scope,
                     hint=f"to draw one write `pick({quoted(node)})`; to ask for any of them write `in`",
                 )  # fmt: skip
-            case ast.Placed():
+            case ast.FilteredRegion():
                 raise self.fail(
                     "S210", "`where` belongs in a place or inside pick(d in group where ...)", node, scope
                 )

@@ -43,7 +43,7 @@ from socialai_dsl.semantics.terms import (
     ReadEach,
     Readings,
     Select,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     arithmetic,
@@ -240,7 +240,7 @@ class Registers:
         """A register that is a known value."""
         self._terms[path] = value
 
-    def put(self, path: str, value: Sited) -> Read:
+    def put(self, path: str, value: SitedTerm) -> Read:
         """A register that takes a value at reset which is resolved already."""
         type_ = value.term.type
         self._terms[path] = Read(type_, path)
@@ -248,7 +248,7 @@ class Registers:
         self._put.append(path)
         return Read(type_, path)
 
-    def remember(self, value: Sited) -> Read:
+    def remember(self, value: SitedTerm) -> Read:
         """A register that takes a value at the start of every step."""
         known = next((drawn for drawn in self.remembered if drawn.value.term == value.term), None)
         if known is None:
@@ -328,7 +328,7 @@ class Registers:
             )
         self.words[declaration.path] = expected
 
-    def draw_file(self, member: str, value: Sited) -> None:
+    def draw_file(self, member: str, value: SitedTerm) -> None:
         """Which file of a member's `one_of` is drawn."""
         self.put(f"{member}.one_of", value)
 
@@ -400,7 +400,7 @@ class Registers:
             starts = [(replace(start, term=Const(type_, nothing)), called) for start, called in starts]
         self._drawn[path] = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
 
-    def _starts(self, declaration: Declaration) -> list[tuple[Sited, str]]:
+    def _starts(self, declaration: Declaration) -> list[tuple[SitedTerm, str]]:
         """What each register of a declaration starts with, and its path."""
         path, scope = declaration.path, declaration.scope
         expected = declaration.expected or self.words.get(path)
@@ -410,16 +410,16 @@ class Registers:
             if holds is None:
                 message = f"nothing is ever put into `{declaration.label}`, so it is not known what it holds"
                 raise self._resolver.findings.fail("S318", message, span, hint="set it in a rule or a step")
-            start = Sited(Const(holds, holds.low), scope.draws.site, span)
+            start = SitedTerm(Const(holds, holds.low), scope.draws.site, span)
             return [(start, self._called(path, key)) for key in declaration.for_each] or [(start, path)]
         if not declaration.for_each:
-            return [(Sited(self._written(declaration, expected), scope.draws.site, span), path)]
+            return [(SitedTerm(self._written(declaration, expected), scope.draws.site, span), path)]
         starts = []
         for i, key in enumerate(declaration.for_each):
             source, raw = declaration.each[i] if declaration.each else (declaration.source, declaration.raw)
             own = replace(scope.at(source, f"{scope.draws.site}[{i}]"), it=key)
             term = self._written(replace(declaration, source=source, raw=raw, scope=own), expected)
-            starts.append((Sited(term, own.draws.site, span), self._called(path, key)))
+            starts.append((SitedTerm(term, own.draws.site, span), self._called(path, key)))
         return starts
 
     def _common_type(self, declaration: Declaration, starts: list[Term]) -> Type:
@@ -571,11 +571,11 @@ class Resolver(ABC):
                 return literal
         return self.value(self.findings.expression(scope.path, raw), expected, scope)
 
-    def sited(self, raw: Scalar, expected: Type | None, scope: Scope) -> Sited:
+    def sited(self, raw: Scalar, expected: Type | None, scope: Scope) -> SitedTerm:
         """The same with its place and the site of its draws."""
-        return Sited(self.written(raw, expected, scope), scope.draws.site, self.findings.at(scope.path))
+        return SitedTerm(self.written(raw, expected, scope), scope.draws.site, self.findings.at(scope.path))
 
-    def undrawn(self, sited: Sited, message: str) -> Sited:
+    def undrawn(self, sited: SitedTerm, message: str) -> SitedTerm:
         """A value in which nothing may be drawn; the message says why."""
         if draws(sited.term):
             raise self.findings.fail("S204", message, sited.span, hint="draw it in `let`, and use that")

@@ -40,7 +40,7 @@ from socialai_dsl.semantics.terms import (
     ObjectType,
     Read,
     Sees,
-    Sited,
+    SitedTerm,
     Term,
     Test,
     Type,
@@ -85,7 +85,7 @@ def place(resolver: Resolver, spot: Spot, raw: str, scope: Scope) -> Placing:
     node = resolver.findings.expression(spot.path, raw)
     span = resolver.findings.at(spot.path)
     where: Term | None = None
-    if isinstance(node, ast.Placed):
+    if isinstance(node, ast.FilteredRegion):
         region, condition = node.region, node.where
     else:
         region, condition = node, None
@@ -457,7 +457,7 @@ def _distinct_color(resolver: Resolver, name: str, path: DataPath) -> Coloring:
     return Coloring(number, f"cast.{group[0]}.color", group[1], resolver.findings.at(path), None, before)
 
 
-def _color(resolver: Resolver, raw: object, scope: Scope) -> Sited | None:
+def _color(resolver: Resolver, raw: object, scope: Scope) -> SitedTerm | None:
     """A colour; None for a random one."""
     return None if raw == "random" else resolver.sited(raw, COLOR, scope)  # type: ignore[arg-type]
 
@@ -488,7 +488,7 @@ def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> 
 
 def _of_group(
     resolver: Resolver, path: DataPath, raw: object, index: int, count: int, scope: Scope
-) -> Sited | None:
+) -> SitedTerm | None:
     """`color: doors.color` gives each member the colour of its counterpart; `permuted(doors.color)` that of another."""
     if not isinstance(raw, str):
         return None
@@ -505,12 +505,14 @@ def _of_group(
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
-    return Sited(FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path))
+    return SitedTerm(
+        FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path)
+    )
 
 
 def _permuted(
     resolver: Resolver, path: DataPath, node: ast.Attribute, index: int, count: int, scope: Scope
-) -> Sited:
+) -> SitedTerm:
     """The colour of one of a group, another one for each, in an order that is drawn."""
     others = groups.group(resolver, node.subject, None, scope)
     if len(others.items) != count:
@@ -519,7 +521,7 @@ def _permuted(
     place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
     colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
     value = chosen(place, range(count), colors, COLOR)
-    return Sited(value, scope.draws.site, resolver.findings.at(path))
+    return SitedTerm(value, scope.draws.site, resolver.findings.at(path))
 
 
 def facings(resolver: Resolver) -> Iterator[Facing]:
@@ -544,7 +546,7 @@ def _facing(resolver: Resolver, name: str, member: CastMember, which: int) -> Fa
             raise resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)
         return Facing(number, site, span, toward=resolver.value(node.args[0], ENTITY, scope))
     term = resolver.value(node, DIRECTION, scope)
-    return Facing(number, site, span, Sited(term, scope.draws.site, span))
+    return Facing(number, site, span, SitedTerm(term, scope.draws.site, span))
 
 
 # -- the order ---------------------------------------------------------------------------------------------------

@@ -10,9 +10,9 @@ from socialai_dsl.semantics.scope import FailedError, Scope, described, quoted, 
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
-    Quantified,
+    Quantification,
     Read,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     Variable,
@@ -162,9 +162,9 @@ def permutation(resolver: Resolver, register: str, count: int, path: DataPath) -
         each = Variable(type_, "each")
         free = all_of(Compare("!=", each, before) for before in order) if order else None
         site = f"{register}[{k}]"
-        drawn = Quantified(type_, "pick", "each", items, free)
+        drawn = Quantification(type_, "pick", "each", items, free)
         if site in resolver.registers:
             order.append(Read(type_, site))
         else:
-            order.append(resolver.registers.put(site, Sited(drawn, site, resolver.findings.at(path))))
+            order.append(resolver.registers.put(site, SitedTerm(drawn, site, resolver.findings.at(path))))
     return tuple(order)

@@ -363,7 +363,7 @@ class InState:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantified:
+class Quantification:
     """any, all, count, first, nearest, pick over the constants `items`; `condition` may hold Variable(name).
 
     pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with
@@ -410,12 +410,12 @@ Term = (
     | Spoke
     | Heard
     | InState
-    | Quantified
+    | Quantification
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Sited:
+class SitedTerm:
     """A term together with the site of its picks (a path, see draws.py) and where it was written."""
 
     term: Term
@@ -430,7 +430,7 @@ class Line:
     parts: tuple[str | Term, ...]
     site: str
     span: Span
-    to: Sited | None = None
+    to: SitedTerm | None = None
     called: tuple[tuple[int, str], ...] = ()
 
 
@@ -656,7 +656,7 @@ def walk(tree: Any) -> Iterator[Term]:
 
 def draws(term: Term) -> bool:
     """Whether something is drawn anew wherever a term is evaluated."""
-    return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
+    return any(isinstance(part, Quantification) and part.op == "pick" for part in walk(term))
 
 
 def may_find_nothing(term: Term) -> bool:
@@ -667,7 +667,7 @@ def may_find_nothing(term: Term) -> bool:
     for part in walk(term):
         if isinstance(part, HeardNoun) or is_own_noun(part):
             return True
-        if isinstance(part, Quantified) and part.op in ("first", "pick", "nearest"):
+        if isinstance(part, Quantification) and part.op in ("first", "pick", "nearest"):
             return True
         if isinstance(part, Read) and (part.path.startswith(NOTED) or part.nothing is not None):
             return True

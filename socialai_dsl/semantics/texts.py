@@ -40,7 +40,7 @@ from socialai_dsl.semantics.terms import (
     Said,
     SaidBy,
     Select,
-    Sited,
+    SitedTerm,
     Speaker,
     Spoke,
     Term,
@@ -453,7 +453,7 @@ def for_ears(resolver: Resolver, heard: Alternative, scope: Scope) -> Alternativ
     return [(replace(pattern, hearer=own), condition) for pattern, condition in heard]
 
 
-def on_hearing(heard: Sequence[Alternative], when: Sited | None, site: str, span: Span) -> Sited:
+def on_hearing(heard: Sequence[Alternative], when: SitedTerm | None, site: str, span: Span) -> SitedTerm:
     """The condition that one of these was heard, and then what else is asked."""
     term = any_of(
         all_of([Heard((pattern,)), *_given(condition)])
@@ -461,7 +461,7 @@ def on_hearing(heard: Sequence[Alternative], when: Sited | None, site: str, span
         for pattern, condition in alternative
     )
     both = term if when is None else all_of([term, when.term])
-    return Sited(both, site, when.span if when is not None else span)
+    return SitedTerm(both, site, when.span if when is not None else span)
 
 
 def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
@@ -692,7 +692,7 @@ def _of_what_is_meant(asked: Speaker | HeardNoun, heard: Sequence[Alternative], 
 # -- what a register is set to, where only that says what it holds -----------------------------------------
 
 
-def value_for(resolver: Resolver, register: str, raw: object, scope: Scope) -> Sited:
+def value_for(resolver: Resolver, register: str, raw: object, scope: Scope) -> SitedTerm:
     """The value that a register is set to; one that may hold nothing can be set to `none`."""
     registers = resolver.registers
     known = registers.holds(register)
@@ -700,7 +700,7 @@ def value_for(resolver: Resolver, register: str, raw: object, scope: Scope) -> S
         base = registers.read(register)
         assert isinstance(base, Read), "internal: a register that is set is no constant"
         nothing = Const(base.type, base.nothing if base.nothing is not None else 0)
-        return Sited(nothing, scope.draws.site, resolver.findings.at(scope.path))
+        return SitedTerm(nothing, scope.draws.site, resolver.findings.at(scope.path))
     if is_nothing(raw) and known is not None and known.kind != "action" and known.words != TURN.words:
         message = "only a register that starts with `none` can hold nothing"
         raise resolver.findings.fail("S204", message, resolver.findings.at(scope.path))

@@ -16,7 +16,7 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     Const,
     Read,
-    Sited,
+    SitedTerm,
     Term,
     Type,
     Variable,
@@ -28,7 +28,7 @@ from socialai_dsl.semantics.texts import value_for
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenMember:
     """One of the group: what it is, the condition on which it is one of those, and what its name means then."""
 
     item: Const
@@ -41,7 +41,9 @@ def found(node: ast.Node | None) -> ast.Quantifier | None:
     return node if isinstance(node, ast.Quantifier) and node.name == groups.THOSE else None
 
 
-def members(resolver: Resolver, node: ast.Quantifier, expected: Type | None, scope: Scope) -> list[Chosen]:
+def members(
+    resolver: Resolver, node: ast.Quantifier, expected: Type | None, scope: Scope
+) -> list[ChosenMember]:
     """The members of the group, each with its condition."""
     groups.check_quantifier(resolver, node, scope)
     known = groups.group(resolver, node.group, expected, scope)
@@ -57,7 +59,7 @@ def members(resolver: Resolver, node: ast.Quantifier, expected: Type | None, sco
         return lambda term: item if isinstance(term, Variable) and term.name == name else None
 
     return [
-        Chosen(item, changed(condition, of(item)), scope.binding(node.var, item))
+        ChosenMember(item, changed(condition, of(item)), scope.binding(node.var, item))
         for item in dict.fromkeys(known.items)
     ]
 
@@ -83,7 +85,7 @@ def _among(item: Const, known: Sequence[Const]) -> bool:
 
 def affected(
     resolver: Resolver, node: ast.Quantifier, args: tuple[ast.Expr, ...], scope: Scope
-) -> Iterator[tuple[list[Chosen], Scope, bool]]:
+) -> Iterator[tuple[list[ChosenMember], Scope, bool]]:
     """Who is affected together, the scope of what the effect takes, and whether that is about each by itself."""
     chosen = members(resolver, node, None, scope)
     if not any(_mentions(arg, node.var) for arg in args):
@@ -118,5 +120,5 @@ def assigned(
         value = value_for(resolver, register, raw, replace(inner, draws=Draws(scope.draws.site)))
         target = resolver.registers.of_key(register, one.item)
         assert isinstance(target, Read), "internal: a known key has a register"
-        only = Sited(one.condition, own.draws.site, value.span)
+        only = SitedTerm(one.condition, own.draws.site, value.span)
         yield Assignment(target.path, value, only=only, each=each)

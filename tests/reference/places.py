@@ -21,7 +21,7 @@ def region(value: Value, context: Context) -> list[Cell]:
 def cells_of(node: Any, context: Context) -> list[Cell]:
     """The cells of a place: interior ones, or those of walls."""
     world = context.world
-    if isinstance(node, ast.Placed):
+    if isinstance(node, ast.FilteredRegion):
         region, condition = cells_of(node.region, context), node.where
         return [c for c in region if condition is None or of(condition, context.knowing(here=c))]
     if isinstance(node, ast.Alternatives):

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import socialai_dsl
-from socialai_dsl.analysis.search import Finding, Search, Verdict, search_rooms
+from socialai_dsl.analysis.search import Finding, Search, SearchVerdict, search_rooms
 
 # The right-hand door is the one; the agent in the upper left corner cannot pass two NPCs.
 WALLED_OFF = {
@@ -33,11 +33,11 @@ def findings(scenario: str, layouts: list[dict[str, Any]], **options: Any) -> li
 
 def test_a_walled_off_exit_is_proven_to_be_one() -> None:
     walled_off, with_a_way = findings("talkitout", [WALLED_OFF, OPEN])
-    assert walled_off.verdict is Verdict.UNSOLVABLE
+    assert walled_off.verdict is SearchVerdict.UNSOLVABLE
     assert walled_off.exact
     assert walled_off.plan is None
     assert walled_off.states % 4 == 0, "four directions of one cell, times what the NPCs know"
-    assert with_a_way.verdict is Verdict.SOLVABLE
+    assert with_a_way.verdict is SearchVerdict.SOLVABLE
 
 
 def test_the_plan_that_was_found_succeeds() -> None:
@@ -55,12 +55,12 @@ def test_the_plan_that_was_found_succeeds() -> None:
 
 def test_nobody_is_in_the_way_of_an_agent_that_does_not_see_them() -> None:
     (finding,) = findings("talkitout+unsocial", [WALLED_OFF])
-    assert finding.verdict is Verdict.SOLVABLE
+    assert finding.verdict is SearchVerdict.SOLVABLE
 
 
 def test_a_search_that_would_take_too_long_is_undecided() -> None:
     (finding,) = findings("talkitout", [OPEN | {"honest": {"at": [3, 2]}}], states=3)
-    assert finding.verdict is Verdict.UNDECIDED
+    assert finding.verdict is SearchVerdict.UNDECIDED
     assert not finding.exact
 
 
@@ -102,8 +102,8 @@ def searched(folder: Path, rule: str, horizon: int) -> Finding:
     return finding
 
 
-@pytest.mark.parametrize(("horizon", "verdict"), [(3, Verdict.UNSOLVABLE), (4, Verdict.SOLVABLE)])
-def test_waiting_is_something_to_do(tmp_path: Path, horizon: int, verdict: Verdict) -> None:
+@pytest.mark.parametrize(("horizon", "verdict"), [(3, SearchVerdict.UNSOLVABLE), (4, SearchVerdict.SOLVABLE)])
+def test_waiting_is_something_to_do(tmp_path: Path, horizon: int, verdict: SearchVerdict) -> None:
     """Standing still changes nothing but the clock that the keeper waits for."""
     finding = searched(tmp_path, "after: 4", horizon)
     assert finding.verdict is verdict
@@ -113,19 +113,19 @@ def test_waiting_is_something_to_do(tmp_path: Path, horizon: int, verdict: Verdi
 def test_time_is_part_of_a_state_only_where_it_matters(tmp_path: Path) -> None:
     """What is never said leaves four directions, and no more however long one may try."""
     finding = searched(tmp_path, "hears: Say that", 60)
-    assert finding.verdict is Verdict.UNSOLVABLE
+    assert finding.verdict is SearchVerdict.UNSOLVABLE
     assert finding.states == 4
 
 
 def test_chance_may_open_a_way(tmp_path: Path) -> None:
     finding = searched(tmp_path, "chance: 0.4", 20)
-    assert finding.verdict is Verdict.SOLVABLE
+    assert finding.verdict is SearchVerdict.SOLVABLE
 
 
 def test_what_chance_decides_is_not_proven(tmp_path: Path) -> None:
     """The search tries some draws of a rare event, not all."""
     finding = searched(tmp_path, "chance: 0.0001", 3)
-    assert finding.verdict is Verdict.UNSOLVABLE
+    assert finding.verdict is SearchVerdict.UNSOLVABLE
     assert not finding.exact
 
 

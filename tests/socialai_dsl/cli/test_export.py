@@ -12,7 +12,7 @@ from safetensors import safe_open
 
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.evaluation.export import Moved
+from socialai_dsl.evaluation.export import MovedScenario
 from socialai_dsl.loader.reader import shipped_folder
 
 Capture = pytest.CaptureFixture[str]
@@ -103,7 +103,7 @@ def test_its_card_says_how_to_play(exported: Path, monkeypatch: pytest.MonkeyPat
 def test_a_shipped_scenario_keeps_its_name(name: str) -> None:
     """Also where the run named its file; only the name says what the other side has as well."""
     spec = f"{shipped_folder() / name}+unsocial"
-    moved = Moved.of(socialai_dsl.load(spec), spec)
+    moved = MovedScenario.of(socialai_dsl.load(spec), spec)
     assert (moved.scenario, moved.texts) == (f"{name.removesuffix('.yaml')}+unsocial", {})
 
 
@@ -112,7 +112,7 @@ def test_all_files_of_a_scenario_go_along(place: Path, tmp_path: Path) -> None:
     shutil.copy(place / "corridor.yaml", tmp_path / "corridor.yaml")
     spec = str(tmp_path / "long.yaml")
     program = socialai_dsl.compile(socialai_dsl.load(spec))
-    moved = Moved.of(socialai_dsl.load(spec), spec)
+    moved = MovedScenario.of(socialai_dsl.load(spec), spec)
     moved.copy(tmp_path / "out")
     assert sorted(moved.texts) == ["scenario/corridor.yaml", "scenario/long.yaml"]
     assert (

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from socialai_dsl.cli.reporters import REPORTERS, Checked
+from socialai_dsl.cli.reporters import REPORTERS, CheckedInput
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.source import Source, Span
 
@@ -13,9 +13,9 @@ SOURCE = Source("a.yaml", "scenario: a\nhorizn: 3\n")
 ERROR = Diagnostic("S101", "unknown key `horizn`", Span("a.yaml", 2, 1, 6), suggestion="horizon")
 WARNING = Diagnostic("W306", "50% <odd> & more", Span("b,c:d.yaml", 4, 7), Severity.WARNING, hint="remove it")
 CHECKED = [
-    Checked("a.yaml", (ERROR,), {"a.yaml": SOURCE}),
-    Checked("b.yaml", (ERROR, WARNING), {"a.yaml": SOURCE}),
-    Checked("c.yaml", (), {}),
+    CheckedInput("a.yaml", (ERROR,), {"a.yaml": SOURCE}),
+    CheckedInput("b.yaml", (ERROR, WARNING), {"a.yaml": SOURCE}),
+    CheckedInput("c.yaml", (), {}),
 ]
 
 
@@ -73,7 +73,7 @@ def test_junit_has_a_case_for_each_file() -> None:
 
 @pytest.mark.parametrize("name", sorted(REPORTERS))
 def test_nothing_found(name: str) -> None:
-    text = REPORTERS[name]([Checked("c.yaml", (), {})], False)
+    text = REPORTERS[name]([CheckedInput("c.yaml", (), {})], False)
     expected = {"text": "1 file checked: 0 errors, 0 warnings", "json": "[]", "github": ""}
     if name in expected:
         assert text == expected[name]

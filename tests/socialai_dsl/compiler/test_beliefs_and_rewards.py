@@ -18,7 +18,7 @@ from socialai_dsl.semantics.terms import (
     Compare,
     Const,
     FieldOf,
-    Quantified,
+    Quantification,
     Read,
     Sees,
     Type,
@@ -88,7 +88,7 @@ def test_a_belief_without_a_condition_always_follows() -> None:
 def test_a_belief_that_finds_nothing_stays() -> None:
     things = Type("entity", DOOR, BOX)
     late = Compare("<", number(1), NOW)
-    which = Quantified(things, "first", "v", (Const(things, DOOR), Const(things, BOX)), late)
+    which = Quantification(things, "first", "v", (Const(things, DOOR), Const(things, BOX)), late)
     checked = believing(None, which, things)
     start_value = Drawn("guide.believes.it", things, sited(Const(things, BOX), "guide.believes.it"))
     env = start(replace(checked, setup=(*checked.setup[:-1], start_value)))

@@ -18,7 +18,7 @@ from socialai_dsl.semantics.terms import (
     Logic,
     Measure,
     Not,
-    Quantified,
+    Quantification,
     Term,
     Type,
     Variable,
@@ -65,7 +65,7 @@ def both(*args: Term) -> Logic:
 
 IN_COLUMN_2 = Compare("==", x_of(HERE), number(2))
 NEXT_TO_AGENT = Relation("next_to", HERE, entity(AGENT))
-NEXT_TO_EITHER = Quantified(
+NEXT_TO_EITHER = Quantification(
     BOOL,
     "any",
     "e",
@@ -103,7 +103,7 @@ def test_values(term: Term, expected: int) -> None:
     assert worth(term) == expected
 
 
-def truth(op: Literal["any", "all"], condition: Term) -> Quantified:
+def truth(op: Literal["any", "all"], condition: Term) -> Quantification:
     return cells(op, condition, BOOL)
 
 

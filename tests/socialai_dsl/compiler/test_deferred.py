@@ -21,7 +21,7 @@ from socialai_dsl.semantics.terms import (
     Line,
     Logic,
     Operation,
-    Quantified,
+    Quantification,
     Read,
     Type,
     Variable,
@@ -113,7 +113,7 @@ def test_a_target_is_the_one_of_before_the_move() -> None:
     """It would be the door once the guide has moved."""
     moved = Compare("<=", FieldOf(COLUMN, entity(GUIDE), "x"), number(4))
     box = Compare("==", Variable(THING, "v"), Const(THING, BOX))
-    which = Quantified(
+    which = Quantification(
         THING, "first", "v", (Const(THING, DOOR), Const(THING, BOX)), Logic("or", (moved, box))
     )
     vanishing = Effect("vanish", (which,), SPAN)
@@ -142,7 +142,7 @@ def test_it_is_counted_once_and_fires_once() -> None:
 
 def test_a_rule_that_finds_nothing_does_nothing_at_all() -> None:
     never = Compare("==", number(1), FieldOf(COLUMN, entity(GUIDE), "y"))
-    which = Quantified(THING, "first", "v", (Const(THING, DOOR), Const(THING, BOX)), never)
+    which = Quantification(THING, "first", "v", (Const(THING, DOOR), Const(THING, BOX)), never)
     env = start(scenario(first(FORWARD, causes=(Effect("vanish", (which,), SPAN),))), FREE)
     step(env)
     assert guide(env)[0] == [4, 2]

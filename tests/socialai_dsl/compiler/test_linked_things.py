@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.folding import Changes, When
+from socialai_dsl.compiler.folding import ChangeAnalysis, When
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Flag, Header, Program, TypeColumn
-from socialai_dsl.semantics.plans import CheckedScenario, Computed, StepPlan
+from socialai_dsl.semantics.plans import CheckedScenario, ComputedStatus, StepPlan
 from socialai_dsl.semantics.terms import BOOL, DIRECTION, Compare, Const, FieldOf, Sees, Type, World
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
@@ -262,7 +262,7 @@ def test_pointing_and_letting_the_arm_sink() -> None:
 
 
 def times(checked: CheckedScenario, *terms: Any) -> list[When]:
-    changes = Changes(checked)
+    changes = ChangeAnalysis(checked)
     return [changes.of(term) for term in terms]
 
 
@@ -299,7 +299,7 @@ def test_views_depend_on_statuses_where_things_hide_others() -> None:
 def test_a_computed_status_follows_a_marble() -> None:
     """Rolling changes a place, not a status: the gate is settled all the same."""
     there = Relation("at", entity(MARBLE), cell(3, 5))
-    checked = replace(workshop(), computed=(Computed(GATE, 0, 1, sited(there)),))
+    checked = replace(workshop(), computed=(ComputedStatus(GATE, 0, 1, sited(there)),))
     env = start(checked, {"agent": {"at": [6, 5], "facing": "left"}})
     seen = []
     for word in ("forward", "none", "none"):

@@ -8,7 +8,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.program import Header
 from socialai_dsl.semantics.plans import RulePlan
-from socialai_dsl.semantics.terms import CELL, DIRECTION, CellOf, Const, Quantified, Sees, Sited
+from socialai_dsl.semantics.terms import CELL, DIRECTION, CellOf, Const, Quantification, Sees, SitedTerm
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     BOX,
@@ -46,12 +46,12 @@ def test_every_instruction_of_a_rule_says_where_it_comes_from() -> None:
 
 
 def test_cells_sets_and_entries_are_readable() -> None:
-    nearest = Quantified(
+    nearest = Quantification(
         CELL, "nearest", "c", (), Relation("unobstructed", HERE, entity(BOX)), cell(5, 1), cells=True
     )
     seen = Sees(entity(GUIDE), CellOf(CELL, nearest), Const(DIRECTION, 2))
     # By chance, so that it does not wait for a status to change.
-    rule = RulePlan("law", "rules[0]", SPAN, when=Sited(seen, "rules[0].when", SPAN), chance=0.5)
+    rule = RulePlan("law", "rules[0]", SPAN, when=SitedTerm(seen, "rules[0].when", SPAN), chance=0.5)
     program = compiled(replace(workbench(), rules=(rule,)))
     start = program.header(Header.RULES_PC)
     assert f"rules at {start}" in program.listing().splitlines()[3]

@@ -13,7 +13,7 @@ from socialai_dsl.semantics.terms import (
     Const,
     Logic,
     Operation,
-    Quantified,
+    Quantification,
     Term,
     Type,
     Variable,
@@ -51,16 +51,16 @@ def test_count_first_any_and_all(size: int) -> None:
     numbers = range(10, 10 + size)
     odd = remainder(3)
     fit = [n for n in numbers if n % 4 == 3]
-    assert worth(Quantified(NUMBER, "count", "n", group(size), odd)) == len(fit)
-    assert worth(Quantified(NUMBER, "first", "n", group(size), odd)) == fit[0]
-    assert worth(Quantified(BOOL, "any", "n", group(size), Compare("<", number(8 + size), ITEM))) is True
-    assert worth(Quantified(BOOL, "all", "n", group(size), Compare("<", ITEM, number(9 + size)))) is False
+    assert worth(Quantification(NUMBER, "count", "n", group(size), odd)) == len(fit)
+    assert worth(Quantification(NUMBER, "first", "n", group(size), odd)) == fit[0]
+    assert worth(Quantification(BOOL, "any", "n", group(size), Compare("<", number(8 + size), ITEM))) is True
+    assert worth(Quantification(BOOL, "all", "n", group(size), Compare("<", ITEM, number(9 + size)))) is False
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_a_pick_takes_every_one_that_fits_and_no_other(size: int) -> None:
     few = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in (10, 12, 9 + size)))
-    pick = Quantified(NUMBER, "pick", "n", group(size), few)
+    pick = Quantification(NUMBER, "pick", "n", group(size), few)
     assert set(worths(pick, range(30))) == {10, 12, 9 + size}
 
 
@@ -82,12 +82,12 @@ def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, i
     items = tuple(Const(NUMBER, n) for n in numbers)
     for one in {first, first + size // 2, first + size - 1}:
         but_one = Compare("!=", ITEM, Const(Type("int", one, one), one))
-        pick = Quantified(NUMBER, "pick", "n", items, but_one)
+        pick = Quantification(NUMBER, "pick", "n", items, but_one)
         program = compiled(with_let(workbench(), "let.answer", pick))
         assert instruction in code(program, "reset")
         named = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in numbers if n != one))
         if size > 1:
-            same = Quantified(NUMBER, "pick", "n", items, named)
+            same = Quantification(NUMBER, "pick", "n", items, named)
             drawn = worths(pick, range(12))
             assert drawn == worths(same, range(12))
             assert one not in drawn
@@ -96,7 +96,7 @@ def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, i
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("op", ["first", "pick"])
 def test_none_that_fits(size: int, op: str) -> None:
-    nothing: Term = Quantified(NUMBER, op, "n", group(size), remainder(9))  # type: ignore[arg-type]
+    nothing: Term = Quantification(NUMBER, op, "n", group(size), remainder(9))  # type: ignore[arg-type]
     assert worth(nothing) == 10, "a value of the reset takes the first"
     rule = RulePlan("law", "rules[0]", SPAN, sets=(Assignment("let.n", sited(nothing, "rules[0].set")),))
     env = start(replace(with_let(workbench(), "let.n", number(0), Type("int", 0, 300)), rules=(rule,)))

@@ -18,7 +18,7 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Logic,
     Operation,
-    Quantified,
+    Quantification,
     Read,
     Term,
     Type,
@@ -121,7 +121,7 @@ def test_effects_in_order() -> None:
 
 
 def test_a_rule_without_a_thing_to_pick_does_not_fire() -> None:
-    none = Quantified(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), Compare("==", DIE, number(9)))
+    none = Quantification(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), Compare("==", DIE, number(9)))
     law = rule("law", causes=(Effect("vanish", (none,), SPAN),))
     assert played(counting(law), "left") == [0]
 

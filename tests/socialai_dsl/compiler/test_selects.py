@@ -14,7 +14,7 @@ from socialai_dsl.semantics.terms import (
     Logic,
     Not,
     Operation,
-    Quantified,
+    Quantification,
     Select,
     Term,
     Type,
@@ -123,7 +123,7 @@ def test_what_a_group_makes_known_is_decided_for_each_of_it() -> None:
         NUMBER, (Compare("==", place, number(1)),), (number(1),), Operation(NUMBER, "*", (place, place))
     )
     condition = Compare("==", DIE, shares)
-    group = Quantified(BOOL, "any", "n", tuple(map(number, (2, 3, 4))), condition)
+    group = Quantification(BOOL, "any", "n", tuple(map(number, (2, 3, 4))), condition)
     expected = Logic("or", tuple(Compare("==", DIE, number(n)) for n in (0, 1, 4)))
     assert fold(group, Facts(), Classes(workbench())) == expected
     assert die(group) == [True, True, False, False]

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.folding import Changes, When
+from socialai_dsl.compiler.folding import ChangeAnalysis, When
 from socialai_dsl.program import Flag, Header
-from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Computed, Effect, RulePlan
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, ComputedStatus, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     CELL,
@@ -24,7 +24,7 @@ from socialai_dsl.semantics.terms import (
     Measure,
     Not,
     PokedNow,
-    Quantified,
+    Quantification,
     Read,
     Sees,
     Select,
@@ -74,7 +74,8 @@ def status(thing: int, value: int) -> Compare:
 def computed(*conditions: Term) -> CheckedScenario:
     """The door is locked while each of the conditions holds (one after the other)."""
     items = tuple(
-        Computed(DOOR, LOCKED, CLOSED, sited(condition, "objects.door.locked")) for condition in conditions
+        ComputedStatus(DOOR, LOCKED, CLOSED, sited(condition, "objects.door.locked"))
+        for condition in conditions
     )
     return replace(workbench(), computed=items)
 
@@ -157,7 +158,7 @@ def test_other_statuses_are_left_alone() -> None:
 
 def test_one_pass_in_the_order_given() -> None:
     """The second switch follows the door, which follows the first switch."""
-    follows = Computed(OTHER_SWITCH, 1, 0, sited(status(DOOR, LOCKED), "objects.switches.state"))
+    follows = ComputedStatus(OTHER_SWITCH, 1, 0, sited(status(DOOR, LOCKED), "objects.switches.state"))
     checked = computed(status(SWITCH, 1))
     checked = replace(checked, computed=(*checked.computed, follows), rules=(law(become(SWITCH, 1)),))
     env = start(checked)
@@ -208,7 +209,7 @@ def test_what_cannot_change_is_decided_by_the_reset() -> None:
     def box(die: int, layout: dict[str, Any] | None = None) -> str:
         return str(start(checked, {"let": {"die": die}} | (layout or {})).describe()["box"]["state"])
 
-    tagged = Computed(BOX, 1, 0, sited(Compare("==", DIE, number(2))))
+    tagged = ComputedStatus(BOX, 1, 0, sited(Compare("==", DIE, number(2))))
     checked = replace(workbench(), computed=(tagged,))
     assert compiled(checked).header(Header.SETTLE_PC) == 0
     assert not settles_always(checked)
@@ -234,12 +235,12 @@ def test_listings_say_where_a_status_comes_from() -> None:
 THING = Variable(ENTITY, "e")
 
 
-def some(condition: Term, *items: int) -> Quantified:
-    return Quantified(BOOL, "any", "e", tuple(map(entity, items)), condition)
+def some(condition: Term, *items: int) -> Quantification:
+    return Quantification(BOOL, "any", "e", tuple(map(entity, items)), condition)
 
 
-def any_cell(condition: Term) -> Quantified:
-    return Quantified(BOOL, "any", "c", (), condition, cells=True)
+def any_cell(condition: Term) -> Quantification:
+    return Quantification(BOOL, "any", "c", (), condition, cells=True)
 
 
 N, S, A = When.NEVER, When.MARKED, When.ANY_TIME
@@ -291,12 +292,12 @@ OCCASIONS: list[tuple[Term, When]] = [
     (Select(NUMBER, (status(SWITCH, 1),), (number(1),), World(NUMBER, "t")), A),
     (some(Relation("next_to", THING, cell(1, 1)), STATUE, DOOR), N),
     (some(Relation("next_to", THING, cell(1, 1)), STATUE, AGENT), A),
-    (Quantified(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), None), A),
-    (Quantified(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(DOOR)), N),
-    (Quantified(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(AGENT)), A),
+    (Quantification(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), None), A),
+    (Quantification(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(DOOR)), N),
+    (Quantification(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(AGENT)), A),
     (any_cell(Relation("next_to", HERE, entity(DOOR))), N),
     (any_cell(Relation("next_to", HERE, entity(AGENT))), A),
-    (Quantified(CELL, "nearest", "c", (), None, entity(AGENT), cells=True), A),
+    (Quantification(CELL, "nearest", "c", (), None, entity(AGENT), cells=True), A),
 ]
 
 
@@ -311,7 +312,7 @@ def test_when_a_value_can_change(term: Term, when: When) -> None:
         sets=(Assignment("let.written", sited(number(1))),),
         causes=(Effect("vanish", (entity(BOX),), SPAN),),
     )
-    assert Changes(replace(checked, rules=(rule,))).of(term) == when
+    assert ChangeAnalysis(replace(checked, rules=(rule,))).of(term) == when
 
 
 @pytest.mark.parametrize(
@@ -320,7 +321,7 @@ def test_when_a_value_can_change(term: Term, when: When) -> None:
 def test_who_walks(name: str, walks: bool) -> None:
     goal = {"turn": (Const(Type("int", -1, 1), 1),), "go_to": (entity(DOOR),)}.get(name, ())
     checked = with_guide(workbench(), state("waiting", activity(name, *goal)))
-    assert Changes(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)
+    assert ChangeAnalysis(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)
     in_first = RulePlan("r", "guide/r", SPAN, do=activity(name, *goal))
     checked = with_guide(workbench(), state("waiting", activity("stay"), first=(in_first,)))
-    assert Changes(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)
+    assert ChangeAnalysis(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)

@@ -21,7 +21,17 @@ from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import load
 from socialai_dsl.program import CELL, Program
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Drawn, RulePlan, StatePlan
-from socialai_dsl.semantics.terms import BOOL, Const, FieldOf, Quantified, Read, Sited, Term, Type, Variable
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Const,
+    FieldOf,
+    Quantification,
+    Read,
+    SitedTerm,
+    Term,
+    Type,
+    Variable,
+)
 from socialai_dsl.semantics.terms import CELL as ANY_CELL
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS
@@ -94,14 +104,14 @@ def y_of(term: Term) -> FieldOf:
 HERE = Variable(ANY_CELL, "c")
 
 
-def cells(op: Any, condition: Term | None, type_: Type = ANY_CELL, to: Term | None = None) -> Quantified:
+def cells(op: Any, condition: Term | None, type_: Type = ANY_CELL, to: Term | None = None) -> Quantification:
     """A quantifier over cells, each of which is HERE."""
-    return Quantified(type_, op, "c", (), condition, to, cells=True)
+    return Quantification(type_, op, "c", (), condition, to, cells=True)
 
 
-def sited(term: Term, site: str = "let.answer") -> Sited:
+def sited(term: Term, site: str = "let.answer") -> SitedTerm:
     """A term with a place in the source."""
-    return Sited(term, site, SPAN)
+    return SitedTerm(term, site, SPAN)
 
 
 def with_let(checked: CheckedScenario, path: str, term: Term, type_: Type | None = None) -> CheckedScenario:

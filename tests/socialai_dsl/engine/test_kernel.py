@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.batch import Batch, Part
+from socialai_dsl.engine.batch import Batch, LinkedProgram
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import Body, Field, Header, Op, Program, Register
@@ -178,7 +178,7 @@ def test_ended_rows_wait_where_resets_are_the_callers() -> None:
 
 def mixed(programs: list[Program], pools: list[list[int]], pool_of_row: list[int]) -> Batch:
     parts = [
-        Part(
+        LinkedProgram(
             program.words,
             1,
             range(4 * i, 4 * i + 4),
@@ -235,7 +235,7 @@ def test_a_pool_draws_its_program_anew_in_every_episode() -> None:
 def test_actions_of_a_larger_space_that_a_program_lacks() -> None:
     program = Assembly(at=((2, 2),), lines=(("x", (2,), 1),)).program()
     # The batch's order: an action the program lacks, forward, none; a template it lacks, its second.
-    part = Part(
+    part = LinkedProgram(
         program.words,
         1,
         range(4),

@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 
 from socialai_dsl.engine.jit import compiled, inline
-from socialai_dsl.engine.pointers import Guarded, bare, float64_of, int16_of, int64_of, make_book, uint32_of
+from socialai_dsl.engine.pointers import (
+    GuardedArray,
+    bare,
+    float64_of,
+    int16_of,
+    int64_of,
+    make_book,
+    uint32_of,
+)
 from socialai_dsl.program import Field
 
 ROOT = Path(__file__).parents[3]
@@ -54,7 +62,7 @@ def test_rows_of_arrays_of_all_kinds(function: Callable[[np.ndarray, int], int])
 
 @pytest.mark.parametrize("index", [-1, 4])
 def test_guards(index: int) -> None:
-    row = Guarded(np.zeros(4, np.int16))
+    row = GuardedArray(np.zeros(4, np.int16))
     with pytest.raises(IndexError, match=f"index {index} is outside a row of 4"):
         row[index]
     with pytest.raises(IndexError, match="outside"):

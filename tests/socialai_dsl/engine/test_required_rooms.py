@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl import draws
-from socialai_dsl.engine.batch import Batch, Part
+from socialai_dsl.engine.batch import Batch, LinkedProgram
 from socialai_dsl.engine.calls import RoomError, Task
 from socialai_dsl.engine.state import ATTEMPTS, PIN_NONE, Key
 from socialai_dsl.program import Body, Field, Op, Program, Register
@@ -118,8 +118,8 @@ def test_the_last_attempt_counts() -> None:
     assert batch.state.registers[0, [Register.ATTEMPT, OWN]].tolist() == [ATTEMPTS - 1, 59]
 
 
-def part_of(program: Program, name: str = "") -> Part:
-    return Part(
+def part_of(program: Program, name: str = "") -> LinkedProgram:
+    return LinkedProgram(
         program.words,
         1,
         range(4),

@@ -10,7 +10,7 @@ import socialai_dsl as sd
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
-from socialai_dsl.llm.questions import Answered, constraints, put, read_answer, score
+from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put, read_answer, score
 from tests.quick import one_in
 
 COLORS = ("red", "green", "dark green")
@@ -70,7 +70,14 @@ def test_a_question_names_its_answers_and_what_a_reply_is_held_to() -> None:
 
 def test_a_score_counts_right_answers_beside_chance() -> None:
     two, four = (Question("q", "?", tuple("abcd"[:count]), "a") for count in (2, 4))
-    found = score([Answered(two, "a"), Answered(two, "b"), Answered(four, None), Answered(four, "a")])
+    found = score(
+        [
+            AnsweredQuestion(two, "a"),
+            AnsweredQuestion(two, "b"),
+            AnsweredQuestion(four, None),
+            AnsweredQuestion(four, "a"),
+        ]
+    )
     assert (found.asked, found.right, found.unread, found.chance) == (4, 2, 1, 0.375)
     assert score([]).chance is None
 

@@ -11,7 +11,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.compiler.assembler import Block
-from socialai_dsl.compiler.instruction_checks import Known, Ranges, problem_of
+from socialai_dsl.compiler.instruction_checks import PathFacts, Ranges, problem_of
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
@@ -106,7 +106,7 @@ class Trial:
         self.random = random.Random(seed)
         self.town, self.table, self.entry = town, table, entry
         self.ranges = ranges
-        self.known = Known(self.ranges, has_room=True)
+        self.known = PathFacts(self.ranges, has_room=True)
         self.known.boards = set(range(TRIED_BOARDS))
         self.next = FIRST_READ
         self.words = [self._word(operand) for operand in entry.operands]

@@ -11,7 +11,7 @@ from PIL import Image
 from socialai_dsl.program import Program
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending
-from socialai_dsl.replay.film import Episode, record
+from socialai_dsl.replay.film import RecordedEpisode, record
 from socialai_dsl.replay.steps import Step, describe_step
 from socialai_dsl.vocabulary import Sentences, Slot
 
@@ -55,7 +55,7 @@ ACTIONS = [np.array(action) for action in ([0, 1, 0, 0], [3, 0, 1, 1], [2, 1, 1,
 HEARD = ["Ann: I am fine.\nBob: Me \x1b[31mtoo", "NA", "nobody"]
 
 
-def recorded() -> Episode:
+def recorded() -> RecordedEpisode:
     return record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {"options": {"test_episode": 4}})
 
 
@@ -100,7 +100,7 @@ def test_transcript() -> None:
 def test_a_transcript_says_once_what_goes_on_in_silence() -> None:
     waits = [Step(t, "none", None, ()) for t in (2, 3, 4, 5)]
     steps = [Step(1, "none", "Hello", ()), *waits, *(Step(t, "left", None, ()) for t in (6, 7, 8))]
-    assert Episode("an episode", steps).transcript().splitlines()[3:8] == [
+    assert RecordedEpisode("an episode", steps).transcript().splitlines()[3:8] == [
         '   1  none       You: "Hello"',
         "   2  none       (until step 5)",
         "   6  left",

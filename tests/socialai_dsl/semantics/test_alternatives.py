@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select
+from socialai_dsl.semantics.terms import Compare, Const, Quantification, Read, Select
 
 BASE = """
 npc: base
@@ -69,7 +69,7 @@ def asks_for(term):
 def test_the_file_is_drawn_first_of_all_that_depends_on_it(meaning, files):
     checked = meaning(**files(ONE, TWO))
     value = drawn(checked)["guide.one_of"]
-    assert isinstance(value.term, Quantified)
+    assert isinstance(value.term, Quantification)
     assert (value.site, value.term.op, value.term.type.words) == ("cast.guide.one_of", "pick", ("one", "two"))
 
 
@@ -112,7 +112,7 @@ def test_a_slot_is_a_register_that_selects_among_what_fills_it(meaning, files):
     found = drawn(meaning(**files(ONE, TWO)))
     goal = found["guide.goal"].term
     assert isinstance(goal, Select)
-    assert {type(value) for value in (*goal.values, goal.default)} == {Read, Quantified}
+    assert {type(value) for value in (*goal.values, goal.default)} == {Read, Quantification}
 
 
 def test_a_slot_filled_alike_is_not_selected(meaning, files):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from socialai_dsl.semantics.terms import Const, Heard, Logic, Operation, Quantified, Read
+from socialai_dsl.semantics.terms import Const, Heard, Logic, Operation, Quantification, Read
 
 
 def frame(**states):
@@ -44,7 +44,7 @@ def test_picks_in_a_rule_have_the_site_of_who_plays(meaning):
     plan = played(meaning, frame(a={"then": [{"say": "Try <pick(colors)> or <pick(colors)>"}]}))
     line = plan.states[0].then[0].say
     assert line.site == "guide/frames.talk.states.a.then[0].say"
-    assert [p.ordinal for p in line.parts if isinstance(p, Quantified)] == [0, 1]
+    assert [p.ordinal for p in line.parts if isinstance(p, Quantification)] == [0, 1]
 
 
 def test_a_text_slot_that_is_the_whole_line_has_the_slots_site(meaning):

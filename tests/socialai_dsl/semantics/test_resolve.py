@@ -16,7 +16,7 @@ from socialai_dsl.semantics.terms import (
     Measure,
     Not,
     Operation,
-    Quantified,
+    Quantification,
     Read,
     Select,
     Type,
@@ -36,7 +36,7 @@ def test_a_let_is_a_register(outcome_term):
 def test_a_relation_to_a_group_asks_for_any_member(outcome_term):
     items = tuple(Const(DOORS, n) for n in range(2, 6))
     condition = Relation("next_to", AGENT, Variable(DOORS, "each"))
-    assert outcome_term("agent.next_to(doors)") == Quantified(BOOL, "any", "each", items, condition)
+    assert outcome_term("agent.next_to(doors)") == Quantification(BOOL, "any", "each", items, condition)
 
 
 def test_a_bare_word_is_what_the_other_side_is(outcome_term):

@@ -6,7 +6,7 @@ import pytest
 
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import Drawn
-from socialai_dsl.semantics.terms import Chance, Compare, Const, Logic, Not, Quantified, Read, Select
+from socialai_dsl.semantics.terms import Chance, Compare, Const, Logic, Not, Quantification, Read, Select
 
 DANCE = {"dance": {"sequence": 2, "moves": ["left", "forward"], "utterance": {"chance": 0.25}}}
 LESSON = {
@@ -34,7 +34,7 @@ def test_each_element_is_drawn_at_a_site_of_its_own(meaning):
 
 def test_a_move_is_picked_from_the_moves(meaning):
     term = drawn(meaning(let=DANCE))["let.dance[1].move"].term
-    assert isinstance(term, Quantified)
+    assert isinstance(term, Quantification)
     assert term.op == "pick"
     assert [term.type.words[item.value] for item in term.items] == ["left", "forward"]
 

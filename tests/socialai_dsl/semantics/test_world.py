@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Compare, Quantified, Read
+from socialai_dsl.semantics.terms import Compare, Quantification, Read
 
 LAMP = {"lamp": {"type": "switch", "place": "anywhere"}}
 
@@ -57,7 +57,7 @@ def test_requirements_are_conditions_at_reset(meaning):
     ).require
     assert isinstance(near.term, terms.Test)
     assert (near.site, near.span.line) != (seen.site, seen.span.line)
-    assert isinstance(seen.term, Quantified)
+    assert isinstance(seen.term, Quantification)
     assert (seen.term.cells, seen.term.items) == (True, ())
 
 
