@@ -21,7 +21,7 @@ _MOST: Final = 64
 _MOST_VALUES: Final = 1_000
 """The most values of the texts of all probes."""
 _LARGEST: Final = 32767
-_KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of the one that is asked"
+_KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
 
 Text = tuple[str | Drawn, ...]
 

@@ -45,7 +45,7 @@ def shape(node: ast.Expr | str) -> object:
         ("nearest(d in doors to me)", ("nearest", "doors", "me")),
         (
             "anywhere where not here.in_front_of(doors)",
-            ("Placed", "anywhere", ("Not", ("in_front_of", "here", "doors"))),
+            ("FilteredRegion", "anywhere", ("Not", ("in_front_of", "here", "doors"))),
         ),
         ('agent.said("Here is <wanted>")', ("said", "agent", ["Here is ", "wanted"])),
         ("pick(doors).color", ("color", ("pick", "doors"))),
