@@ -1,7 +1,7 @@
 """Finds the files that a command is given: paths, folders, standard input."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,18 +13,21 @@ if TYPE_CHECKING:
 STDIN: Final = "-"
 
 
-def yaml_files(folder: str) -> list[str]:
-    """The YAML files under a folder, sorted.
+def given_files(paths: Iterable[str]) -> list[str]:
+    """The files that paths stand for, each once: a folder for the YAML files below it, anything else for itself.
 
     Raises:
-        UsageError: there is none.
+        UsageError: there is no YAML file below a folder.
     """
     from socialai_dsl.loader.reader import yaml_files_below
 
-    names = yaml_files_below(Path(folder))
-    if not names:
-        raise UsageError(f"{folder}: expected scenario files (*.yaml) in this folder, found none")
-    return names
+    names: dict[str, None] = {}
+    for path in paths:
+        found = yaml_files_below(Path(path)) if Path(path).is_dir() else [path]
+        if not found:
+            raise UsageError(f"{path}: expected scenario files (*.yaml) in this folder, found none")
+        names.update(dict.fromkeys(found))
+    return list(names)
 
 
 def standard_input(name: str) -> Mapping[Path, "Source"]:

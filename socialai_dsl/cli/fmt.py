@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
+from socialai_dsl.cli.files import STDIN, given_files, standard_input
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Format each file; one that cannot be read as YAML is reported and stays as it is."""
     changed = failed = 0
-    names = [n for path in arguments.paths for n in (yaml_files(path) if Path(path).is_dir() else [path])]
-    for name in dict.fromkeys(names):
+    names = given_files(arguments.paths)
+    for name in names:
         try:
             changed += _format(name, arguments.check, arguments.diff)
         except ScenarioError as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import add_effort, positive
 from socialai_dsl.cli.errors import Exit, is_usage
-from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
+from socialai_dsl.cli.files import STDIN, given_files, standard_input
 from socialai_dsl.cli.reporters import REPORTERS, CheckedInput, limited
 from socialai_dsl.cli.terminal import ProgressLine, shows_color
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
-    results = [_checked(name, arguments.stdin_filename) for name in _expand(arguments.paths)]
+    results = [_checked(name, arguments.stdin_filename) for name in given_files(arguments.paths)]
     checked = _without_used(results)
     if arguments.deep:
         right = [result for (_, result), c in zip(results, checked, strict=True) if not c.errors]
@@ -75,16 +75,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
         print(report)
     failed = any(c.errors or (arguments.strict and c.warnings) for c in checked)
     return Exit.FINDINGS if failed else Exit.GOOD
-
-
-def _expand(paths: list[str]) -> Iterator[str]:
-    """Yield each file once: a folder gives the YAML files under it, sorted; anything else stays as it is."""
-    yielded = set()
-    for path in paths:
-        for name in yaml_files(path) if Path(path).is_dir() else [path]:
-            if name not in yielded:
-                yielded.add(name)
-                yield name
 
 
 def _checked(name: str, stdin_filename: str) -> tuple[CheckedInput, "CheckResult"]:

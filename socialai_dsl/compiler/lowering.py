@@ -530,7 +530,7 @@ class _FrameCompiler:
         return True
 
     def _noting_of_agent(self, to: Expressions, entry: int) -> Activities:
-        """The player of a scripted agent may not do what its entry says, so what that notes is noted before it acts."""
+        """A player in the script's place need not do what the entry says, so its notes are taken before it acts."""
         aim = self.aims.get(entry) if self._is_agents else None
         activities = self._activities(to, aim)
         if aim is not None:

@@ -93,7 +93,7 @@ def _place_in_view(row: Row, npc: int) -> int:
     dy = field(row, npc, Field.Y) - field(row, AGENT, Field.Y)
     ahead = dx * step_x(direction) + dy * step_y(direction)
     right = dy * step_x(direction) - dx * step_y(direction)
-    # One question and not three, each of which is answered either way: positions are as good as random.
+    # One test instead of three: positions are as good as random, so each branch on them is often mispredicted.
     if (ahead < 0) | (ahead >= VIEW) | (abs(right) > _HALF):
         return NOTHING
     return (right + _HALF) * VIEW + VIEW - 1 - ahead

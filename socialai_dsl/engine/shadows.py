@@ -146,7 +146,7 @@ def _onward_from(opaque: np.uint64, ahead: int, reached: int) -> int:
 
 @inline
 def _is_mirrored(direction: int) -> int:
-    """1 if the columns of the view that `_opaque_in_view` gives run from right to left: looking down or left."""
+    """1 if the columns of the view of `_opaque_in_view` run from right to left, as when looking down or left."""
     return (direction ^ (direction >> 1)) & 1
 
 
@@ -154,12 +154,12 @@ def _is_mirrored(direction: int) -> int:
 def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
     """Where one cannot look through in the view of the agent's size: a byte for each row, the nearest the lowest.
 
-    Nothing branches: positions and directions are as good as random. Off the canvas is opaque.
+    There are no branches: they would depend on positions and be mispredicted. Cells off the canvas are opaque.
     """
     height = row.program[Header.CANVAS_HEIGHT]
     top = y - _HALF * (1 - step_y(direction))
     left = x - _HALF * (1 - step_x(direction))
-    # Looking down or up, rows of the view are rows of the room, else its columns, which lie behind its rows.
+    # Rows of the view are rows of the room when looking down or up, else its columns, which lie behind its rows.
     along = 1 - (direction & 1)
     turned = (top ^ left) & -along
     wider = (row.program[Header.CANVAS_WIDTH] ^ height) & -along

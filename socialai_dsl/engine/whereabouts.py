@@ -39,7 +39,7 @@ def facing(row: Row, thing: int) -> int:
 
 @inline
 def attribute(row: Row, thing: int, name: int) -> int:
-    """One field; X and Y are -1 of what is not in the room, and of a cell the other fields are 0."""
+    """One field. X and Y are -1 for a thing outside the room; a cell has 0 in all other fields."""
     if name <= Field.Y and not is_somewhere(row, thing):
         return np.int64(NOTHING)
     if thing < NO_CELL:

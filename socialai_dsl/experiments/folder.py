@@ -216,7 +216,7 @@ class Run:
         return max(times, default=None)
 
     def is_cancelled(self) -> bool:
-        """Whether it is asked to be given up."""
+        """Whether a command has asked to give the run up."""
         return (self.path / CANCEL).exists()
 
 

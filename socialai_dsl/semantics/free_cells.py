@@ -457,7 +457,7 @@ def _taken_away(term: Term) -> int:
     raise UnknownError
 
 
-# -- drawn rooms: members and things that are missing against the author's intention ------------------------
+# -- drawn rooms: members and things that are absent unintentionally -----------------------------------------
 
 
 _ROOMS: Final = 100

@@ -231,7 +231,7 @@ class Session:
         self._player, self._policy, self._moments = "me", None, []
 
     def _choose(self, player: str) -> None:
-        """Hand the play to another player."""
+        """Change the player."""
         path = str(self._path)
         loaded = load(path, self._texts)
         if player == "script" and unscripted(loaded):

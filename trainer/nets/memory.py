@@ -135,7 +135,8 @@ def emptied(memory: Tensor, starts: Tensor) -> Tensor:
 class LstmMemory(Memory):
     """An LSTM (Hochreiter and Schmidhuber 1997); the memory is h and c, (E, 2, size), the output h.
 
-    Its passes over a rollout are written out, which makes training a fifth faster than `Memory.forward`.
+    Its passes over a rollout are written out, which makes training a fifth faster than `Memory.forward`. PyTorch's LSTM
+    over packed episodes has the same outputs, but its backward pass takes more than twice as long.
     """
 
     def __init__(self, inputs: int, size: int = 128) -> None:
