@@ -53,7 +53,7 @@ from socialai_dsl.semantics.plans import (
     RulePlan,
     StepPlan,
 )
-from socialai_dsl.semantics.terms import BOOL, Type
+from socialai_dsl.semantics.terms import BOOL, Pattern, Type
 
 
 class RuleConditions:
@@ -228,6 +228,7 @@ class _FrameCompiler:
             if nested.rounds > 1
         }
         self.speaker = shared.checked.entities[frame.entity]
+        self.patterns = tuple(dict.fromkeys(every(Pattern, frame)))
         self._is_agents = frame.entity == AGENT
         self.later = DeferredRules(frame, self.speaker, shared.registers, shared.lines)
 
@@ -292,12 +293,18 @@ class _FrameCompiler:
             to = self._expressions(Facts(heard=SEVERAL))
             emit(to)
             return [self.shared.code.add(to.block, label)] * (self.shared.classes.count + 1)
-        addresses = []
-        for heard in (*range(self.shared.classes.count), SEVERAL):
-            to = self._expressions(Facts(heard=heard))
-            emit(to)
-            addresses.append(self.shared.code.add(to.block, label))
-        return addresses
+        addresses: dict[object, int] = {}
+        alike = [self._told_apart(heard) for heard in range(self.shared.classes.count)]
+        for heard, key in (*enumerate(alike), (SEVERAL, SEVERAL)):
+            if key not in addresses:
+                to = self._expressions(Facts(heard=heard))
+                emit(to)
+                addresses[key] = self.shared.code.add(to.block, label)
+        return [addresses[key] for key in (*alike, SEVERAL)]
+
+    def _told_apart(self, heard: int) -> tuple[bool, ...]:
+        """All that the frame can tell of an utterance class: which of its patterns the class fits."""
+        return tuple(heard in self.shared.classes.matching(pattern) for pattern in self.patterns)
 
     def _expressions(self, facts: Facts) -> Expressions:
         return self.shared.expressions(facts, self.shared.inbox_of[self.frame.member])
