@@ -422,7 +422,7 @@ class _Spoken:
 
     frames: dict[str, behaviour.Spoken]
 
-    def lines(self, members: Mapping[str, object]) -> dict[str, list[Line]]:
+    def lines(self, members: Iterable[str]) -> dict[str, list[Line]]:
         """Member -> its lines in the order of its frame."""
         return {name: list(self.frames[name].lines.values()) for name in members if name in self.frames}
 
@@ -504,7 +504,7 @@ class _Run:
         words = words_in_order(
             self._symbols.sentences,
             names,
-            spoken.lines(self._symbols.cast),
+            spoken.lines(member for member in self._symbols.cast if member != AGENT),
             [one.tone for one in inhabitants],
         )
         return CheckedScenario(

@@ -728,12 +728,14 @@ def words_in_order(
     lines: Mapping[str, Sequence[Line]],
     tones: Iterable[Term | None],
 ) -> tuple[str, ...]:
-    """The words of the grammar, then of the names, of what each member can say, and of tones, by first appearance.
+    """The words of the grammar, then of the names, of what each NPC can say, and of tones, by first appearance.
+
+    What the agent says has words of the grammar only, so a scenario has the same words with a script and without.
 
     Args:
         sentences: templates come first, then the words of their slots.
         names: the name of each member of the cast, in order.
-        lines: member -> its lines in the order of its frame.
+        lines: NPC -> its lines in the order of its frame.
         tones: the tone of each entity, None without one.
     """
     texts = chain(

@@ -36,6 +36,17 @@ def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
     assert [str(peek) for peek in found.peeks] == []
 
 
+@pytest.mark.parametrize("name", ALL)
+def test_a_script_leaves_actions_and_words_as_they_are(name: str) -> None:
+    """Else no agent can be trained by it: the words would have other numbers in the scenario itself."""
+    scripted, plain = sd.load(f"{name}+oracle"), sd.load(name)
+    assert isinstance(scripted, sd.LoadedScenario)
+    assert isinstance(plain, sd.LoadedScenario)
+    assert scripted.checked.words_in_order == plain.checked.words_in_order
+    assert scripted.checked.sentences == plain.checked.sentences
+    assert scripted.checked.actions == plain.checked.actions
+
+
 @pytest.mark.parametrize("name", PAPER)
 def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
     scripted = sd.load(f"{name}+oracle")
