@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-import socialai_dsl as sd
+from tests.scenarios.playing import made
 
 FOLDER = Path(__file__).parent / "transcripts"
 FILES = sorted(FOLDER.glob("*.txt"))
@@ -61,7 +61,7 @@ def read(path: Path) -> tuple[str, dict[str, Any], list[Turn]]:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_transcript(path: Path) -> None:
     name, layout, turns = read(path)
-    env = sd.make(name)
+    env = made(name)
     # What the layout leaves open must not matter.
     for seed in range(5):
         env.reset(seed=seed, options={"layout": layout})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -109,12 +109,18 @@ class Episode:
         return tuple(self.image[3 + aside, 6 - ahead].tolist())
 
 
-def rooms(name: str, number: int) -> Iterator[dict[str, Any]]:
-    """States after the reset, one for each seed."""
-    env = made(name)
-    for seed in range(number):
+@cache
+def _drawn(name: str) -> list[dict[str, Any]]:
+    return []
+
+
+def rooms(name: str, number: int) -> Sequence[dict[str, Any]]:
+    """States after the reset, one for each seed; they are drawn once, so nobody may change them."""
+    known, env = _drawn(name), made(name)
+    for seed in range(len(known), number):
         env.reset(seed=seed)
-        yield env.describe()
+        known.append(env.describe())
+    return known[:number]
 
 
 def beside(cell: Iterable[int], direction: str, cells: int = 1) -> Cell:

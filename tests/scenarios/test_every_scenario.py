@@ -112,7 +112,7 @@ def drawn_action(rng: random.Random, episode: Episode) -> tuple[str | None, str 
 
 @pytest.mark.parametrize("name", [*NAMES, *(f"{name}+unsocial" for name in NAMES)])
 def test_the_first_picture(name: str) -> None:
-    for seed in range(150):
+    for seed in range(30):
         episode = Episode(name, seed=seed)
         assert [[tuple(cell) for cell in column] for column in episode.image.tolist()] == picture(
             name, episode.now()
@@ -122,7 +122,7 @@ def test_the_first_picture(name: str) -> None:
 @pytest.mark.parametrize("name", [*DEFAULT, *(f"{name}+unsocial" for name in DEFAULT)])
 def test_the_picture_after_each_step(name: str) -> None:
     rng = random.Random(name)
-    for seed in range(60):
+    for seed in range(15):
         episode = Episode(name, seed=seed)
         for _ in range(15):
             ended = episode.act(*drawn_action(rng, episode)).ended
@@ -213,26 +213,9 @@ def test_pickup_and_drop_do_nothing(name: str) -> None:
     assert course("pickup") == course("drop") == course(None)
 
 
-@pytest.mark.parametrize("name", ["talkitout", "diverse_exit", "showme", "help"])
-def test_turning_and_walking(name: str) -> None:
-    for seed in range(40):
-        episode = Episode(name, seed=seed)
-        before = episode.now()
-        way = WAYS.index(before["agent"]["facing"])
-        episode.act("left")
-        assert episode.now()["agent"]["facing"] == WAYS[(way - 1) % 4]
-        episode.acts("right", "right")
-        assert episode.now()["agent"]["facing"] == WAYS[(way + 1) % 4]
-        room = episode.now()
-        ahead = beside(room["agent"]["at"], room["agent"]["facing"])
-        free = world(name, room)[ahead] in (EMPTY, LAVA)
-        episode.act("forward")
-        assert tuple(episode.now()["agent"]["at"]) == (ahead if free else tuple(room["agent"]["at"]))
-
-
 @pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("showme_no_social")])
 def test_hidden_npcs_can_be_walked_through(name: str) -> None:
-    member = next(member for member in CAST if member in next(rooms(name, 1)))
+    member = next(member for member in CAST if member in rooms(name, 1)[0])
     size = {} if name.startswith("cointhief") else {"room": {"width": 7, "height": 7}}
     layout = {**size, member: {"at": [2, 2]}, "agent": {"at": [1, 2], "facing": "right"}}
     for variant, reached in ((name, [1, 2]), (f"{name}+unsocial", [2, 2])):
@@ -246,16 +229,3 @@ def test_hidden_npcs_can_be_walked_through(name: str) -> None:
 def test_the_unsocial_room_is_the_same_room(name: str) -> None:
     for social, unsocial in zip(rooms(name, 100), rooms(f"{name}+unsocial", 100), strict=True):
         assert social == unsocial
-
-
-@pytest.mark.parametrize("name", [*NAMES, *(f"{name}+unsocial" for name in NAMES)])
-def test_a_state_can_be_put_back_as_a_layout(name: str) -> None:
-    rng = random.Random(name)
-    for seed in range(30):
-        episode = Episode(name, seed=seed)
-        for _ in range(rng.randrange(8)):
-            if episode.act(*drawn_action(rng, episode)).ended:
-                break
-        else:
-            state = episode.now()
-            assert Episode(name, state, seed + 1000).now() == state

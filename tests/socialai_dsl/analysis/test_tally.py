@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ def played(name: str, together: int, scripted: bool) -> Tally:
     return tally(envs, scenarios_of(sd.load(name)), act, begin, EPISODES, seed=3, clock=Clock())
 
 
+@cache
 def explained(name: str, scripted: bool) -> tuple[Counter[tuple[str, str]], Counter[str]]:
     """(kind, file:line) of all that fired, and the outcomes, in the same episodes one by one."""
     env: Any = sd.make(name).unwrapped
