@@ -87,7 +87,7 @@ def _scripted(loaded: LoadedScenario, called: str) -> LoadedScenario | None:
         if any(diagnostic.code not in _UNKNOWN for diagnostic in error.diagnostics):
             raise
         return None
-    return scripted if isinstance(scripted, LoadedScenario) else None
+    return scripted if isinstance(scripted, LoadedScenario) and not unscripted(scripted) else None
 
 
 _UNKNOWN: Final[frozenset[Any]] = frozenset({"S503", "S504", "S508"})

@@ -107,10 +107,16 @@ def _about(name: str, data: Mapping[str, Any]) -> str:
     return f"{changes[:1].upper()}{changes[1:]}. A variant of [{base}]({base}.md): {about}"
 
 
+def _reward(slope: int, each_step: int) -> str:
+    """The reward, from thousandths that are lost by the horizon and millionths for every step."""
+    also = f", and {each_step / 1e6:g} in every step" if each_step else ""
+    return f"1 - {slope / 1000:g} t / horizon for a success in step t, else 0{also}"
+
+
 def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any], link: str) -> list[str]:
     from socialai_dsl.compilation import compile_loaded
     from socialai_dsl.program import Header
-    from socialai_dsl.program_suite import ProgramSuite
+    from socialai_dsl.program_suite import ProgramSuite, channels_of
 
     playable = compile_loaded(loaded)
     programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
@@ -119,15 +125,21 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any], link: str) -> l
     tokens = max(program.header(Header.TOKENS) for program in programs)
     ids = [f"`SocialAI/{gym}-v1`" for gym, scenario in IDS.items() if scenario == name]
     horizons = sorted({program.header(Header.HORIZON) for program in programs})
+    rewards = sorted(
+        {(one.header(Header.SLOPE), one.header(Header.EACH_STEP)) for one in programs}, reverse=True
+    )
     skills = data.get("skills") or []
     rows = [
         ("file", f"[`scenarios/{name}.yaml`]({link})" if link else code(display_name(loaded.resolved.path))),
         ("Gymnasium", ", ".join(ids)),
         ("skills", ", ".join(skills if isinstance(skills, list) else [skills]).replace("_", " ")),
         ("horizon", " or ".join(map(str, horizons)) + " steps"),
-        ("reward", "1 - 0.9 t / horizon for a success in step t, else 0"),
+        ("reward", " or ".join(_reward(*numbers) for numbers in rewards)),
         ("action", f"{sizes}: body, speak or not, template, {', '.join(slot.name for slot in slots)}"),
-        ("observation", f"image 7 x 7 x 4 and {tokens} tokens of {len(playable.vocabulary)} words"),
+        (
+            "observation",
+            f"image 7 x 7 x {len(channels_of(programs))} and {tokens} tokens of {len(playable.vocabulary)} words",
+        ),
         ("body actions", ", ".join([*playable.actions, "none"])),
     ]
     if not isinstance(playable, ProgramSuite):

@@ -102,7 +102,7 @@ class ScenarioReport:
 
     def _is_for_nothing(self, what: str) -> bool:
         """Whether a property looks at no room at all, such as that of a script that is not there."""
-        return any(f"`{plan.text}`" == what and plan.kind == "oracle" for plan, _ in self.tried)
+        return any(f"`{plan.text}`" == what and plan.kind in ("oracle", "script") for plan, _ in self.tried)
 
     def as_object(self) -> dict[str, Any]:
         """The report for JSON."""

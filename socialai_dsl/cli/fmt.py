@@ -2,12 +2,11 @@
 
 import argparse
 import difflib
-import os
-import stat
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.files import STDIN, given_files, standard_input
 from socialai_dsl.cli.terminal import shows_color
@@ -65,7 +64,7 @@ def _format(name: str, check: bool, diff: bool) -> bool:
         if name == STDIN:
             sys.stdout.write(text)
         elif changes:
-            _replace(Path(name), text)
+            write_text(Path(name).resolve(), text)  # a link stays a link
     elif check and changes and not diff:
         print(source.name)
     return changes
@@ -81,18 +80,3 @@ def _read(name: str) -> tuple["Source", bytes]:
     read_source(Path(name))  # says what is wrong with what is no file, or too large to be one
     original = Path(name).read_bytes()
     return decoded(original, display_name(Path(name))), original
-
-
-def _replace(path: Path, text: str) -> None:
-    """Replace a file in one go, keeping who may read it; a link stays a link."""
-    path = path.resolve()
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with open(temporary, "x", encoding="utf-8", newline="\n") as file:
-            os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

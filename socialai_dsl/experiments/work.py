@@ -209,7 +209,8 @@ class _Work:
                 if crashes == _CRASHES_IN_PLACE:
                     raise _FailedError(f"{crash}, {crashes} times while playing {', '.join(missing)}")
                 self._status.end(crash)
-                output.truncate(0)
+                output.seek(0)  # the next process writes where this one stopped
+                output.truncate()
             output.seek(0)
             found = json.loads(output.read())
         figures = {name: entry["eval"] for name, entry in zip(missing, found, strict=True)}

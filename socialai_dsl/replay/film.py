@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.program_suite import Playable
+from socialai_dsl.program_suite import Playable, outcome_name
 from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.replay.endings import Ending
 from socialai_dsl.replay.steps import Step, describe_step
@@ -115,7 +115,7 @@ def record(
         dialogue += step.dialogue
         if ended:
             episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
-            episode.ending = (endings or {}).get(episode.outcome)
+            episode.ending = (endings or {}).get(outcome_name(info))
         episode.frames.append(
             compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t, cast=cast)
         )

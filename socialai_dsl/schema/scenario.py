@@ -261,11 +261,6 @@ class Frame(Model):
         None, description="in place of states: activities in a row, each until it is finished"
     )
 
-    @property
-    def has_nested_steps(self) -> bool:
-        """Whether some entries of `steps` are nested."""
-        return any(step.steps is not None for step in self.steps or ())
-
     def all_effects(self) -> Iterator[Effects]:
         """Every rule and entry."""
         yield from (step for _, step in self.entries())
@@ -595,9 +590,6 @@ class Probe(Model):
 # -- the file ------------------------------------------------------------------------------------------------
 
 
-"""The agent's body actions in the order of the paper (appendix, action space)."""
-
-
 MemberName = Annotated[
     str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)
 ]
@@ -760,9 +752,6 @@ class Scenario(Model):
             drawn = [one.model_copy(update={"frame": None}) for one in drawn]
         return tuple(drawn)
 
-    def npcs(self) -> dict[str, CastMember]:
-        """The members other than the agent, in the order they act."""
-        return {name: member for name, member in self.members().items() if name != "agent"}
-
     def __repr__(self) -> str:
-        return f"<Scenario {self.scenario}: {len(self.npcs())} NPCs, {len(self.frames)} frames, horizon {self.horizon}>"
+        npcs = len(self.cast.keys() - {"agent"})
+        return f"<Scenario {self.scenario}: {npcs} NPCs, {len(self.frames)} frames, horizon {self.horizon}>"

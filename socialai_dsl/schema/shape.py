@@ -125,18 +125,15 @@ _EXTENDS = "extends"
 """A key that is gone when the models see a file."""
 
 
-def mend_indentation(model: type[BaseModel], tree: Node, bag: DiagnosticBag) -> None:
-    """Move keys that are indented one level too little or too much; reports S101 once for keys that follow each other.
+class _Mender:
+    """Moves keys that are indented one level too little or too much; reports S101 once for keys that follow each other.
 
     Args:
         model: what the document should be.
         tree: the document; changed.
         bag: takes the findings.
     """
-    _Mender(model, tree, bag).mend(())
 
-
-class _Mender:
     def __init__(self, model: type[BaseModel], tree: Node, bag: DiagnosticBag) -> None:
         self._model = model
         self._tree = tree
@@ -325,7 +322,7 @@ def model_of(
     known = len(bag)
     made = _tried(model, repaired.tree.data)
     if made is None:
-        mend_indentation(model, repaired.tree, bag)
+        _Mender(model, repaired.tree, bag).mend(())
     fill_gaps(repaired, bag)
     if made is not None and len(bag) == known:
         return ShapedFile(made, repaired.tree, False)

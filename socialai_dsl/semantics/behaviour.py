@@ -404,9 +404,8 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     states = tuple(planner.state(name, state) for name, state in (frame.states or {}).items())
     steps = tuple(planner.step(path, step) for path, step in frame.entries())
     start = (frame.start or next(iter(frame.states), "")) if frame.states else ""
-    nested = (
-        NestedPlanner(resolver, played, planner.condition, steps).plan() if frame.has_nested_steps else None
-    )
+    has_nested = any(step.steps is not None for step in frame.steps or ())
+    nested = NestedPlanner(resolver, played, planner.condition, steps).plan() if has_nested else None
     return FramePlan(played.member, played.name, played.number, span, start, states, steps, nesting=nested)
 
 

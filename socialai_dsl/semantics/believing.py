@@ -86,7 +86,10 @@ class BeliefResolver:
         value = texts.value_for(resolver, self.register, source.of, of)
         asked = scope.at((*path, "when"), f"{site}.when")
         when = None if source.when is None else resolver.sited(source.when, BOOL, asked)
-        heard = self._hears(source, (*path, "hears"), scope.at((*path, "hears"), f"{site}.hears"))
+        heard: Sequence[Alternative] = [
+            texts.heard_at(resolver, raw, scope.at(place, f"{site}.hears"))
+            for place, raw in findings.each((*path, "hears"), source.hears)
+        ]
         if heard:
             span = findings.at((*path, "hears"))
             if wanted := asked_of_heard((value, when)):
@@ -94,13 +97,6 @@ class BeliefResolver:
             when = on_hearing(heard, when, asked.draws.site, span)
             value, when = changed((value, when), binding(heard))
         return when, value
-
-    def _hears(self, source: Source, path: DataPath, scope: Scope) -> Sequence[Alternative]:
-        """The patterns of each of the texts that a source waits for."""
-        resolver, found = self._resolver, list[Alternative]()
-        for place, raw in resolver.findings.each(path, source.hears):
-            found.append(texts.heard_at(resolver, raw, scope.at(place, scope.draws.site)))
-        return found
 
     def _forgetting(self) -> tuple[SitedTerm | None, int]:
         """The condition on which it is forgotten, or after how many turns (0: never)."""

@@ -111,13 +111,9 @@ class _Entry:
                 if goals:
                     return replace(plan, text=f"{kind}: {raw}", goals=goals)
                 condition, remembered = self._condition(place, raw)
-                return replace(
-                    plan, text=f"{kind}: {raw}", condition=condition, remembered=remembered, share=entry.share
-                )
+                return replace(plan, text=f"{kind}: {raw}", condition=condition, remembered=remembered)
             case "within":
-                return replace(
-                    plan, text=f"within: {entry.within}", steps=entry.within or 0, share=entry.share
-                )
+                return replace(plan, text=f"within: {entry.within}", steps=entry.within or 0)
             case "oracle":
                 return replace(plan, text=f"oracle: {entry.oracle:g}", share=entry.oracle)
             case "knowable":
@@ -133,9 +129,7 @@ class _Entry:
                 found = tuple((path, values) for path in tried if len(set(values := _values(lets[path]))) > 1)
                 if entry.draw is not None and not found:
                     raise self._not_a_pick((*self._path, "draw"), entry.draw)
-                return replace(
-                    plan, text=f"needs: {', '.join(members)}", members=members, draws=found, share=entry.share
-                )
+                return replace(plan, text=f"needs: {', '.join(members)}", members=members, draws=found)
             case "only_through":
                 assert entry.only_through is not None, "internal: there is a value for this key"
                 word, by = entry.only_through.draw, entry.only_through.by

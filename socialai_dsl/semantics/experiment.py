@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
 from typing import Any, Final
@@ -150,10 +150,10 @@ class _Expansion:
         drafts = []
         for draft in own:
             above = (*self._matching(overrides, draft), *last, *self._matching(profiled, draft))
-            drafts.append(_on_top(draft, first, above))
+            drafts.append(replace(draft, layers=(*first, *draft.layers, *above)))
         self._report_idle([*overrides, *profiled], own)
         extra = self._drafts(profile.conditions, (*at, "conditions")) if at else ()
-        drafts += [_on_top(draft, (*first, *last), ()) for draft in extra]
+        drafts += [replace(draft, layers=(*first, *last, *draft.layers)) for draft in extra]
         found = [cell for draft in drafts if (cell := self._cell(draft)) is not None]
         self._check_names(drafts)
         self._check_size(found)
@@ -348,18 +348,6 @@ class _Expansion:
         if runs > MAX_RUNS:
             message = f"an experiment has at most {MAX_RUNS} runs, this one has {runs}"
             self._bag.error("S004", message, self._places.key_span(("conditions",)))
-
-
-def _on_top(draft: _Draft, below: Sequence[_Layer], above: Sequence[_Layer]) -> _Draft:
-    return _Draft(
-        draft.name,
-        draft.group,
-        draft.row,
-        draft.column,
-        draft.place,
-        (*below, *draft.layers, *above),
-        draft.labels,
-    )
 
 
 def _tested(test: str | Transfer) -> tuple[str, Reference | None]:

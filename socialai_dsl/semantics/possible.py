@@ -489,20 +489,11 @@ class Possible:
         a, b = self._values(left), self._values(right)
         if not a or not b:
             return True
-        if not wanted:
-            op = {"==": "!=", "!=": "==", "<": ">=", "<=": ">"}[op]  # type: ignore[assignment]
-        match str(op):
-            case "==":
-                return _meet(a, b)
-            case "!=":
-                return not a[0] == a[-1] == b[0] == b[-1]
-            case "<":
-                return a[0] < b[-1]
-            case "<=":
-                return a[0] <= b[-1]
-            case ">=":
-                return a[-1] >= b[0]
-        return a[-1] > b[0]
+        if op in ("==", "!="):
+            return _meet(a, b) if (op == "==") is wanted else not a[0] == a[-1] == b[0] == b[-1]
+        if not wanted:  # not a < b is b <= a
+            a, b, op = b, a, "<=" if op == "<" else "<"
+        return a[0] < b[-1] if op == "<" else a[0] <= b[-1]
 
     def _values(self, term: Term) -> Sequence[int]:
         """All that a term can be, at most, in ascending order; empty if that is not known.

@@ -32,7 +32,6 @@ from socialai_dsl.semantics.signatures import (
     QUANTIFIERS,
     VALUE_SYNONYMS,
     VALUES,
-    Signature,
 )
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -99,7 +98,9 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     signature = VALUES.get(node.name)
     if signature is None:
         raise _unknown(resolver, node, scope)
-    _check_count(resolver, signature, node, scope)
+    most = len(signature.takes)
+    if not most - signature.optional <= len(node.args) <= most:
+        raise resolver.fail("S211", wrong_count(signature, len(node.args)), node, scope)
     if signature.subject == "none":
         return _function(resolver, node, expected, scope)
     if not signature.takes:
@@ -179,13 +180,6 @@ def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> FailedError:
     near = did_you_mean(node.name, candidates)
     kind = "word" if node.subject is None else "verb"
     return resolver.fail("S205", f"unknown {kind} `{node.name}`", node, scope, suggestion=near)
-
-
-def _check_count(resolver: Resolver, signature: Signature, node: ast.Call, scope: Scope) -> None:
-    most = len(signature.takes)
-    if most - signature.optional <= len(node.args) <= most:
-        return
-    raise resolver.fail("S211", wrong_count(signature, len(node.args)), node, scope)
 
 
 # -- functions -------------------------------------------------------------------------------------------------
@@ -424,7 +418,7 @@ class ScenarioResolver(Resolver):
             case ast.Text(plain=plain):
                 if plain is None:
                     raise self.fail("S204", "a text with <...> can only be said or heard", node, scope)
-                return self._as_text(plain, expected, node, scope)
+                return self.fit(text_value(plain), expected, node, scope)
             case ast.Name():
                 return self.fit(resolve_names.name(self, node, expected, scope), expected, node, scope)
             case ast.Attribute():
@@ -456,11 +450,6 @@ class ScenarioResolver(Resolver):
                 )
             case _:
                 raise AssertionError(f"internal: no meaning for {type(node).__name__}")
-
-    def _as_text(self, text: str, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
-        if expected is None or expected.kind == "text":
-            return text_value(text)
-        return self.fit(text_value(text), expected, node, scope)
 
     # -- logic and comparisons -------------------------------------------------------------------------------
 

@@ -74,7 +74,6 @@ class Utterances:
         self.said_by: dict[str, dict[str, None]] = {}
         self.sentences = sentences
         self._by_normal: dict[str, list[tuple[int, str]]] = {}
-        self._known_texts = 0
 
     @cached_property
     def _pairs(self) -> dict[str, set[tuple[int, int]]]:
@@ -86,9 +85,11 @@ class Utterances:
 
     def add_npc_texts(self, member: str, texts: Iterable[str]) -> None:
         """Make known what a member of the cast can say."""
-        found = dict.fromkeys(texts)
-        self.npc_texts |= found
-        self.said_by.setdefault(member, {}).update(found)
+        own = self.said_by.setdefault(member, {})
+        for text in texts:
+            if text not in self.npc_texts:
+                self._by_normal.setdefault(normal(text), []).append((len(self.npc_texts), text))
+            self.npc_texts[text] = own[text] = None
 
     def match(self, said: str) -> frozenset[tuple[int, int]]:
         """The pairs of template and filling that a text is, `<slot>` standing for all that the slot can be."""
@@ -96,11 +97,12 @@ class Utterances:
 
     def npcs_matching(self, said: str) -> dict[str, int | None]:
         """The texts of NPCs that fit, each with the filling that its slots have; None of a text without slots."""
-        known = self._npc_texts()
         wanted: dict[str, int | None] = {}
         for text, filling in self._filled(said):
             wanted[normal(text)] = filling
-        found = sorted((place, text, like) for like in wanted for place, text in known.get(like, ()))
+        found = sorted(
+            (place, text, like) for like in wanted for place, text in self._by_normal.get(like, ())
+        )
         return {text: wanted[like] for _, text, like in found}
 
     def _filled(self, said: str) -> Iterator[tuple[str, int | None]]:
@@ -119,14 +121,6 @@ class Utterances:
                 text = text.replace(slot.place, slot.words[choice])
             digits = [choice if is_there else None for choice, is_there in zip(choices, there, strict=True)]
             yield text, self.sentences.filling(digits)
-
-    def _npc_texts(self) -> dict[str, list[tuple[int, str]]]:
-        """What NPCs say, by what counts of it, with its place among all texts, to which others only are added."""
-        texts = self.npc_texts
-        for place, text in enumerate(islice(texts, self._known_texts, None), self._known_texts):
-            self._by_normal.setdefault(normal(text), []).append((place, text))
-        self._known_texts = len(texts)
-        return self._by_normal
 
     def filling_of(self, said: str) -> int | None:
         """The filling of what the grammar can say; None where it cannot, or the template has no slots."""

@@ -144,15 +144,10 @@ class Findings:
             hint = f"{hint}; a text is quoted: {as_text(problem.words, self.part(path))}"
         return self.fail(code, str(problem), self.at(path, problem.offset), hint=hint)
 
-    def _filled(self, tree: ast.Expr, path: DataPath) -> ast.Expr:
-        if not any(isinstance(node, ast.Parameter) for node in tree.walk()):
-            return tree
-        return self._replaced(tree, path)
-
-    def _replaced(self, node: ast.Expr, path: DataPath) -> ast.Expr:
+    def _filled(self, node: ast.Expr, path: DataPath) -> ast.Expr:
         if isinstance(node, ast.Parameter):
             return self._parameter(node, path)
-        replaced: ast.Expr = rebuilt(node, lambda part: self._replaced(part, path))
+        replaced: ast.Expr = rebuilt(node, lambda part: self._filled(part, path))
         return replaced
 
     def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:

@@ -492,11 +492,13 @@ def _of_group(
     """`color: doors.color` gives each member the colour of its counterpart; `permuted(doors.color)` that of another."""
     if not isinstance(raw, str):
         return None
-    node = resolver.findings.expression(path, raw)
+    node, shuffled = resolver.findings.expression(path, raw), False
     match node:
         case ast.Call(name="permuted", args=(ast.Attribute(name="color") as colors,), subject=None):
-            return _permuted(resolver, path, colors, index, count, scope)
-    if not isinstance(node, ast.Attribute) or not groups.is_group(resolver, node.subject, scope):
+            node, shuffled = colors, True
+    if not isinstance(node, ast.Attribute) or not (
+        shuffled or groups.is_group(resolver, node.subject, scope)
+    ):
         return None
     others = groups.group(resolver, node.subject, None, scope)
     if node.name != "color":
@@ -505,22 +507,11 @@ def _of_group(
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
-    return SitedTerm(
-        FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path)
-    )
-
-
-def _permuted(
-    resolver: Resolver, path: DataPath, node: ast.Attribute, index: int, count: int, scope: Scope
-) -> SitedTerm:
-    """The colour of one of a group, another one for each, in an order that is drawn."""
-    others = groups.group(resolver, node.subject, None, scope)
-    if len(others.items) != count:
-        message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
-        raise resolver.fail("S106", message, node, scope)
-    place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
-    colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
-    value = chosen(place, range(count), colors, COLOR)
+    colors_of = tuple(FieldOf(COLOR, other, "color") for other in others.items)
+    value: Term = colors_of[index]
+    if shuffled:
+        place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
+        value = chosen(place, range(count), colors_of, COLOR)
     return SitedTerm(value, scope.draws.site, resolver.findings.at(path))
 
 

@@ -24,7 +24,6 @@ from socialai_dsl.semantics.terms import (
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import is_number, is_plain
 
-_PERMUTED = "permuted"
 _NO_KEYS = ("entity", "cell", "bool", "utterance")
 """Kinds of values that no words stand for."""
 
@@ -136,7 +135,7 @@ def _permuted(
     """`permuted(other)`: the keys of another table with its values in an order that is drawn at reset."""
     node = resolver.findings.expression(path, raw)
     match node:
-        case ast.Call(name=word, args=(ast.Name(id=other),), subject=None) if word == _PERMUTED:
+        case ast.Call(name="permuted", args=(ast.Name(id=other),), subject=None):
             pass
         case _:
             message = "a table is written out, or permuted(another table)"

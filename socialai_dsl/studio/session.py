@@ -97,7 +97,7 @@ class Session:
         except (ValueError, RoomError) as error:
             raise RefusalError(str(error)) from None
         assert self._tracer is not None, "internal: a program that can be played has a tracer"
-        self._chance = np.random.default_rng(seed)
+        self._seed, self._chance = seed, np.random.default_rng(seed)
         if self._policy is not None:
             self._policy.reset(np.ones(1, np.bool_))
         self._tracer.begin(f"seed {seed}" if layout is None else "a layout", observation, info)

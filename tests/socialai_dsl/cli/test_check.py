@@ -295,3 +295,13 @@ def test_an_interrupted_game_counts_what_was_played(capsys: Capture, monkeypatch
     (found,) = json.loads(capsys.readouterr().out)
     assert found["interrupted"]
     assert found["episodes"]["random"] < 20 == found["planned"]
+
+
+def test_a_variant_oracle_in_which_the_agent_follows_no_frame_is_no_script(
+    gate: Path, capsys: Capture
+) -> None:
+    gate.with_name("gate_oracle.yaml").write_text("variant: oracle\nof: gate.yaml\nset: {horizon: 6}\n")
+    assert main(["check", claiming(gate, "{script: perceives}"), "--rooms", "2"]) == 1
+    out = capsys.readouterr().out
+    assert "`script: perceives`" in out
+    assert "there was time for" not in out

@@ -47,3 +47,10 @@ def test_so_has_everything_that_can_be_loaded(name: str, capsys: pytest.CaptureF
 def test_a_name_that_is_neither(capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["explain", "talkitot"]) == 2
     assert "talkitout" in capsys.readouterr().err
+
+
+def test_a_sheet_has_the_reward_and_the_channels_of_its_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["explain", "school/boxes"]) == 0
+    sheet = capsys.readouterr().out
+    assert "| reward | 1 - 0.1 t / horizon for a success in step t, else 0 |" in sheet
+    assert "| observation | image 7 x 7 x 6 and " in sheet

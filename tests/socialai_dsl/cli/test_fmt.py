@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.cli import fmt
 from socialai_dsl.cli.main import main
 
 Capture = pytest.CaptureFixture[str]
@@ -90,7 +89,7 @@ def test_a_write_that_breaks_off_leaves_the_file(folder: Path, monkeypatch: pyte
     def full(descriptor: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(fmt.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     assert main(["fmt", "untidy.yaml"]) == 2
     assert (folder / "untidy.yaml").read_bytes() == UNTIDY
     assert sorted(path.name for path in folder.iterdir()) == ["tidy.yaml", "untidy.yaml"]

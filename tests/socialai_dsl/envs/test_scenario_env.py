@@ -296,3 +296,12 @@ def test_a_scenario_with_mistakes_raises_them_all() -> None:
         sd.make("talkitut")
     assert caught.value.diagnostics
     assert "talkitout" in str(caught.value)
+
+
+def test_a_reset_that_leaves_an_ended_episode_as_it_is_does_not_revive_it() -> None:
+    env = sd.make("talkitout")
+    env.reset(seed=1)
+    assert env.step(np.array([env.action_space.nvec[0] - 2, 0, 0, 0]))[2], "`done` ends the episode"
+    env.reset(options={"reset_mask": np.array([False])})
+    with pytest.raises(ValueError, match="outside of an episode"):
+        env.step(np.array([0, 0, 0, 0]))

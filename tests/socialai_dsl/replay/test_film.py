@@ -32,8 +32,8 @@ PROGRAM = cast(Program, Words())
 class Stand:
     """An environment of three steps that says what it was told to."""
 
-    def __init__(self, heard: list[str]) -> None:
-        self._heard = heard
+    def __init__(self, heard: list[str], **more: str) -> None:
+        self._heard, self._more = heard, more
 
     def reset(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         self.t, self.options = 0, options
@@ -44,7 +44,7 @@ class Stand:
         info: dict[str, Any] = {"utterance": self._heard[self.t - 1]}
         ended = self.t == len(self._heard)
         if ended:
-            info |= {"outcome": "success@7", "success": True}
+            info |= {"outcome": "success@7", "success": True} | self._more
         return {}, 0.75 if ended else 0.0, ended, False, info
 
     def render(self) -> np.ndarray:
@@ -116,6 +116,13 @@ def test_a_transcript_ends_with_the_line_that_decided() -> None:
         "success (success@7) after 3 steps, reward 0.750",
         "success: agent.at(door)   my.yaml:7",
     ]
+
+
+def test_in_a_suite_the_ending_is_that_of_the_member() -> None:
+    ending = Ending("one: success@7", True, "success: agent.at(door)", "one.yaml", 7)
+    played = Stand(HEARD, member="one")
+    episode = record(played, PROGRAM, ACTIONS, "an episode", {}, endings={"one: success@7": ending})
+    assert episode.transcript().splitlines()[-1] == "success: agent.at(door)   one.yaml:7"
 
 
 def test_the_film_has_a_picture_for_each_step_and_one_before(tmp_path: Path) -> None:

@@ -52,6 +52,13 @@ def test_nothing_else_is_reached(root: Path, name: str) -> None:
     assert (root.parent / "secret.yaml").read_text() == "secret: true\n"
 
 
+def test_saving_keeps_who_may_read_a_file(root: Path) -> None:
+    folder, file = Folder(root), root / "one.yaml"
+    file.chmod(0o600)
+    folder.write("one.yaml", "scenario: mine\n", folder.read("one.yaml")[1])
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
 def test_two_windows_do_not_write_over_each_other(root: Path) -> None:
     folder = Folder(root)
     _, known = folder.read("one.yaml")

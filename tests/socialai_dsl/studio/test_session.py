@@ -99,6 +99,7 @@ def test_a_thing_is_put_elsewhere_and_the_layout_can_be_used(session: Session) -
         if (x, y) not in taken
     )
     placed = session.place("wizard", free)
+    assert placed["seed"] == 3, "what happens later is drawn as before"
     assert placed["trace"]["moments"][0]["state"]["wizard.at"] == free
     assert placed["trace"]["moments"][0]["state"]["let.exit"] == before["let"]["exit"]
     env = sd.make("talkitout")
