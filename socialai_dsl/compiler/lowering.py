@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 
 from socialai_dsl.compiler.activities import (
@@ -228,7 +229,6 @@ class _FrameCompiler:
             if nested.rounds > 1
         }
         self.speaker = shared.checked.entities[frame.entity]
-        self.patterns = tuple(dict.fromkeys(every(Pattern, frame)))
         self._is_agents = frame.entity == AGENT
         self.later = DeferredRules(frame, self.speaker, shared.registers, shared.lines)
 
@@ -294,17 +294,19 @@ class _FrameCompiler:
             emit(to)
             return [self.shared.code.add(to.block, label)] * (self.shared.classes.count + 1)
         addresses: dict[object, int] = {}
-        alike = [self._told_apart(heard) for heard in range(self.shared.classes.count)]
-        for heard, key in (*enumerate(alike), (SEVERAL, SEVERAL)):
-            if key not in addresses:
+        for heard, fitting in (*enumerate(self._fitting), (SEVERAL, SEVERAL)):
+            if fitting not in addresses:
                 to = self._expressions(Facts(heard=heard))
                 emit(to)
-                addresses[key] = self.shared.code.add(to.block, label)
-        return [addresses[key] for key in (*alike, SEVERAL)]
+                addresses[fitting] = self.shared.code.add(to.block, label)
+        return [addresses[fitting] for fitting in (*self._fitting, SEVERAL)]
 
-    def _told_apart(self, heard: int) -> tuple[bool, ...]:
-        """All that the frame can tell of an utterance class: which of its patterns the class fits."""
-        return tuple(heard in self.shared.classes.matching(pattern) for pattern in self.patterns)
+    @cached_property
+    def _fitting(self) -> list[tuple[bool, ...]]:
+        """For each utterance class, which patterns of the frame it fits: classes that fit the same share their code."""
+        classes = self.shared.classes
+        matching = [classes.matching(pattern) for pattern in dict.fromkeys(every(Pattern, self.frame))]
+        return [tuple(heard in matched for matched in matching) for heard in range(classes.count)]
 
     def _expressions(self, facts: Facts) -> Expressions:
         return self.shared.expressions(facts, self.shared.inbox_of[self.frame.member])

@@ -213,7 +213,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         super().reset(seed=seed)
         self._table.reset(seed, options)
-        self._ended = bool(self._registers[Register.ENDED])  # `reset_mask` may leave an episode that has
+        self._ended = bool(self._registers[Register.ENDED])  # still so where `reset_mask` is False
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
             self.render()

@@ -507,11 +507,11 @@ def _of_group(
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
-    colors_of = tuple(FieldOf(COLOR, other, "color") for other in others.items)
-    value: Term = colors_of[index]
+    each = tuple(FieldOf(COLOR, other, "color") for other in others.items)
+    value: Term = each[index]
     if shuffled:
         place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
-        value = chosen(place, range(count), colors_of, COLOR)
+        value = chosen(place, range(count), each, COLOR)
     return SitedTerm(value, scope.draws.site, resolver.findings.at(path))
 
 
