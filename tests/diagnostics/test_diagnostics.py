@@ -1,4 +1,8 @@
-"""Mistakes of authors: each has a file here and, beside it, what is said of it; each code has its page in the docs."""
+"""Mistakes of authors: each has a file here and, beside it, what is said of it; each code has its page in the docs.
+
+Most are slips in a file in which nothing is wrong. `shop.slips` tells those in `shop.yaml`, each under its name: lines
+that are there, of which those behind a minus sign go, and behind plus signs the lines that come after them.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,32 @@ from socialai_dsl.diagnostics import CODES, render_text
 from socialai_dsl.frontend import CheckResult, check
 
 FOLDER = Path(__file__).parent
-CASES = sorted(path.stem for path in FOLDER.glob("[0-9]*.yaml"))
+
+
+def slips() -> dict[str, str]:
+    """The name and the text of each file that slips make."""
+    found = {}
+    for file in FOLDER.glob("*.slips"):
+        right = file.with_suffix(".yaml").read_text(encoding="utf-8")
+        for slip in file.read_text(encoding="utf-8").split("\n\n"):
+            name, _, changes = slip.partition(":\n")
+            found[name] = slipped(right, changes)
+    return found
+
+
+def slipped(text: str, changes: str) -> str:
+    """The text after some changes, each of which is about lines that are there once."""
+    for change in re.findall(r"(?:[ -].*\n)+(?:\+.*\n)*", f"{changes}\n"):
+        lines = [(line[0], line[1:]) for line in change.splitlines(keepends=True)]
+        before = "".join(line for mark, line in lines if mark != "+")
+        after = "".join(line for mark, line in lines if mark != "-")
+        assert f"\n{text}".count(f"\n{before}") == 1, before
+        text = f"\n{text}".replace(f"\n{before}", f"\n{after}")[1:]
+    return text
+
+
+SLIPS = slips()
+CASES = sorted([*(path.stem for path in FOLDER.glob("[0-9]*.yaml")), *SLIPS])
 ONE_SLIP = ("75", "76", "77", "78", "80", "81", "82", "83")
 """How the numbers of files begin in which an author made one slip: it is one finding."""
 
@@ -29,14 +58,28 @@ NOT_FROM_ONE_FILE = {
 }
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all files, those that slips make among them."""
+    folder = tmp_path_factory.mktemp("diagnostics")
+    shutil.copytree(
+        FOLDER, folder, ignore=shutil.ignore_patterns("*.out", "*.py", "*.slips"), dirs_exist_ok=True
+    )
+    for name, text in SLIPS.items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    return folder
+
+
 @cache
 def checked(case: str) -> CheckResult:
     return check(f"{case}.yaml")
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_said_of_a_mistake(case: str, update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(FOLDER)
+def test_what_is_said_of_a_mistake(
+    case: str, whole: Path, update_goldens: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(whole)
     result = checked(case)
     said = render_text(result.diagnostics, result.sources) + "\n"
     golden = FOLDER / f"{case}.out"
@@ -47,15 +90,17 @@ def test_what_is_said_of_a_mistake(case: str, update_goldens: bool, monkeypatch:
     assert len(result.diagnostics) == 1 or not case.startswith(ONE_SLIP)
 
 
-def test_every_code_has_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(FOLDER)
+def test_every_code_has_a_case(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(whole)
     seen = {d.code for case in CASES for d in checked(case).diagnostics}
     missing = set(CODES) - seen - set(NOT_FROM_ONE_FILE)
     assert not missing, f"no file in tests/diagnostics shows {sorted(missing)}"
     assert not seen & set(NOT_FROM_ONE_FILE), "these codes have a file now: take them off the list"
 
 
-@pytest.mark.parametrize("name", ["small.yaml", "rich.yaml", "town.yaml", "rich.yaml?count=2&length=4"])
+@pytest.mark.parametrize(
+    "name", ["small.yaml", "rich.yaml", "town.yaml", "shop.yaml", "rich.yaml?count=2&length=4"]
+)
 def test_the_files_that_the_mistakes_were_made_in_are_right(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
