@@ -57,7 +57,7 @@ test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; i
 	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
 
 test-bounds: $(STAMP) ## the engine's tests with checked bounds and guard cells around every array, one after another
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -m "not slow and not learning" --guards tests/socialai_dsl/engine tests/socialai_dsl/envs tests/socialai_dsl/analysis $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -m "not slow and not learning" --guards tests/test_one_step.py tests/test_odd_moments.py tests/socialai_dsl/engine tests/socialai_dsl/envs tests/socialai_dsl/analysis $(ARGS)
 
 endurance: $(STAMP) ## play 500 million steps over all scenarios and watch memory, speed and open files
 	$(BIN)/python -m pytest -m slow -s tests/test_endurance.py $(ARGS)

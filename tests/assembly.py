@@ -38,6 +38,9 @@ IDLE, PRESSED = 0, 1
 STILL, ROLLING = 0, 1
 _FIRST_ROW = {"agent": 0, "npc": 1, "door": 2, "lava": 5, "marble": 6, "generator": 8, "platform": 10}
 
+CLASSES = (1, 2, 3, 1, 1, 4)
+HEARD_SIZE, INBOX_REGISTERS = 4, 5
+
 Instruction = tuple[int, ...]
 
 
@@ -78,7 +81,7 @@ class Assembly:
     Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked), lava, marble (still, rolling:
     it rolls when pushed), generator (idle, pressed: when pushed) and platform. Doors that are not open are the only
     things one cannot look through; open doors, lava and platforms can be walked on.
-    Templates x nouns are 2 x 3; `classes` gives the utterance class of each pair.
+    Templates x nouns are 2 x 3, in the utterance classes `CLASSES`.
     """
 
     at: Sequence[tuple[int, int] | None] = ((2, 2),)
@@ -93,29 +96,20 @@ class Assembly:
     rules: Sequence[Instruction] = ()
     outcomes: dict[tuple[int, int], Sequence[Instruction]] = field(default_factory=dict)
     frames: Sequence[FrameSpec] = ()
-    classes: Sequence[int] = (1, 2, 3, 1, 1, 4)
     horizon: int = 10
     flags: int = 0
     earshot: tuple[int, int] = (0, 1)
-    audible: Sequence[int] = ()
     lines: Sequence[tuple[str, Sequence[int], int]] = ()  # text, token ids, class
-    line_nouns: Sequence[int] = ()  # by line, -1 if left out
     tokens: int = 8
     log: int = 4
     deadly: bool = False
-    counted: int = 1
     sites: Sequence[tuple[int, int]] = ((draws.site("a"), 0), (draws.site("b"), 3))
     agent_says: int = 0
     view: int = 7
     before: Sequence[Instruction] = ()
     links: Sequence[Instruction] = ()
     require: Sequence[Instruction] = ()
-    tick: Sequence[Instruction] = ()
-    slope: int = 900
-    each_step: int = 0
     channels: int = 4
-    class_sets: Sequence[Sequence[int]] = ()
-    pushed_by_rolling: Sequence[int] = ()  # entities that only something rolling pushes
 
     def __post_init__(self) -> None:
         self.code: list[Instruction] = [(Op.HALT, 0, 0, 0)]
@@ -133,17 +127,17 @@ class Assembly:
 
     def program(self) -> Program:
         """The program, with all tables."""
-        classes = max(self.classes) + 1
+        classes = max(CLASSES) + 1
         width, height = self.canvas
         entities = len(self.at)
         frame_registers = self.own + self.registers
         heard = frame_registers + 2 * len(self.frames)
-        inbox = self.inbox_register(0, len(self.frames))
-        log = inbox + self._inbox_registers() * entities
+        inbox = heard + HEARD_SIZE
+        log = inbox + INBOX_REGISTERS * entities
         header = np.zeros(Header.END, np.int64)
         tables: list[tuple[Header, list[int]]] = [
             (Header.ACTION_AT, [*range(7), Body.NONE]),
-            (Header.CLASS_AT, list(self.classes)),
+            (Header.CLASS_AT, list(CLASSES)),
             (Header.ENTITY_AT, self._entities()),
             (Header.TYPE_AT, self._types()),
             (Header.ROOM_AT, self._room()),
@@ -153,7 +147,7 @@ class Assembly:
             (Header.LINE_AT, self._lines()),
             (Header.TOKEN_AT, [token for _, tokens, _ in self.lines for token in tokens]),
             (Header.SITE_AT, [number for site in self.sites for number in site]),
-            (Header.CLASS_SET_AT, self._class_sets(classes)),
+            (Header.CLASS_SET_AT, []),
         ]
         header[Header.RESET_PC] = self.add(self._reset())
         header[Header.SETTLE_PC] = self.add(self.settle)
@@ -161,7 +155,6 @@ class Assembly:
         header[Header.BEFORE_PC] = self.add(self.before)
         header[Header.LINKS_PC] = self.add(self.links)
         header[Header.REQUIRE_PC] = self.add(self.require)
-        header[Header.TICK_PC] = self.add(self.tick)
         tables.append((Header.CODE_AT, [word for instruction in self.code for word in instruction]))
         words = [0] * Header.END
         for at, table in tables:
@@ -185,9 +178,9 @@ class Assembly:
             Header.LOG: log,
             Header.LOG_SIZE: self.log,
             Header.HEARD: heard,
-            Header.HEARD_SIZE: 4,
+            Header.HEARD_SIZE: HEARD_SIZE,
             Header.INBOX: inbox,
-            Header.INBOX_SIZE: 4,
+            Header.INBOX_SIZE: INBOX_REGISTERS - 1,
             Header.FRAMES: len(self.frames),
             Header.DEADLY: 1 << LAVA if self.deadly else 0,
             Header.MIN_WIDTH: self.size[0],
@@ -199,12 +192,10 @@ class Assembly:
             Header.STATES: sum(len(frame.activities) for frame in self.frames),
             Header.SITES: len(self.sites),
             Header.TYPE_ROWS: 11,
-            Header.COUNTERS: self.counted + outcomes + 1,
+            Header.COUNTERS: 1 + outcomes + 1,
             Header.AGENT_SAYS: self.agent_says,
-            Header.SLOPE: self.slope,
-            Header.EACH_STEP: self.each_step,
+            Header.SLOPE: 900,
             Header.CHANNELS: self.channels,
-            Header.CLASS_SETS: len(self.class_sets),
             Header.CLASS_SET_WORDS: classes // 32 + 1,
         }.items():
             header[name] = number
@@ -222,7 +213,7 @@ class Assembly:
             outcome_table=tuple(
                 Outcome(name, name == "won") for name in ("won", "lost", "deadly", "timeout")
             ),
-            rules=tuple(f"rule{i}" for i in range(self.counted)),
+            rules=("rule0",),
             vocabulary=("<pad>", "<unk>", *(f"word{i}" for i in range(20))),
             source_map=[None] * len(self.code),
             labels={},
@@ -268,10 +259,8 @@ class Assembly:
                 kind = self.objects[entity - 1 - self.npcs]
             row = [0] * EntityColumn.COLUMNS
             row[EntityColumn.TYPE] = _FIRST_ROW[kind]
-            row[EntityColumn.PUSHED_BY] = int(entity in self.pushed_by_rolling)
             row[EntityColumn.KIND] = entity if kind == "npc" else 0
             row[EntityColumn.NEAR], row[EntityColumn.FAR] = self.earshot
-            row[EntityColumn.AUDIBLE] = int(entity in self.audible)
             row[EntityColumn.VIEW] = self.view
             rows += row
         return rows
@@ -321,23 +310,12 @@ class Assembly:
             row[FrameColumn.STATE] = registers + 2 * number
             row[FrameColumn.CLOCK] = registers + 2 * number + 1
             row[FrameColumn.ROWS], row[FrameColumn.STATES] = first, len(frame.activities)
-            row[FrameColumn.INBOX] = inbox + self._inbox_registers() * frame.entity
+            row[FrameColumn.INBOX] = inbox + INBOX_REGISTERS * frame.entity
             row[FrameColumn.PERCEIVE] = self.add(frame.perceive)
             row[FrameColumn.DEFERRED] = self.add(frame.deferred)
             rows += row
             first += len(frame.activities)
         return rows
-
-    def inbox_register(self, entity: int, frames: int) -> int:
-        """The inbox of an entity in a program with so many frames."""
-        return self.own + self.registers + 2 * frames + 4 + self._inbox_registers() * entity
-
-    def _inbox_registers(self) -> int:
-        return 1 + 4 * (3 if self.flags & Flag.HEARD_BY else 1)
-
-    def state_register(self, frame: int) -> int:
-        """The register of a frame's state; its clock is the next."""
-        return self.own + self.registers + 2 * frame
 
     def _states(self, classes: int) -> list[int]:
         rows: list[int] = []
@@ -364,37 +342,28 @@ class Assembly:
     def _lines(self) -> list[int]:
         rows: list[int] = []
         first = 0
-        for number, (_, tokens, heard) in enumerate(self.lines):
-            noun = self.line_nouns[number] if number < len(self.line_nouns) else -1
-            rows += [first, len(tokens), heard, noun]
+        for _, tokens, heard in self.lines:
+            rows += [first, len(tokens), heard, -1]
             first += len(tokens)
-        return rows
-
-    def _class_sets(self, classes: int) -> list[int]:
-        rows: list[int] = []
-        for members in self.class_sets:
-            words = np.zeros(classes // 32 + 1, np.uint32)
-            for member in members:
-                words[member // 32] |= np.uint32(1 << member % 32)
-            rows += words.view(np.int32).tolist()
         return rows
 
 
 HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
-def part_of(program: Program) -> LinkedProgram:
-    """A program with its links into a batch of programs like it."""
+def part_of(program: Program, first_outcome: int = 0, name: str = "") -> LinkedProgram:
+    """A program with its links into a batch of programs like it, in which its outcomes are numbered from the first."""
     return LinkedProgram(
         words=program.words,
         rules=len(program.rules),
-        outcomes=range(len(program.outcome_table)),
+        outcomes=range(first_outcome, first_outcome + len(program.outcome_table)),
         actions=[*range(7), Body.NONE],
         templates=range(2),
         slots=[range(3)],
         strides=[[0, 1], [0, 1]],
         tokens=range(len(program.vocabulary)),
         successes=[outcome.success for outcome in program.outcome_table],
+        name=name,
     )
 
 
@@ -411,6 +380,12 @@ def step(batch: Batch, action: tuple[int, ...] = (7, 0, 0, 0)) -> None:
     """One step of all rows, by default without a movement or word."""
     batch.ports.actions[:] = action
     assert batch.step(Task.STEP_ONLY) >= 0
+
+
+def play(batch: Batch, *actions: tuple[int, ...]) -> None:
+    """A step of all rows for each action."""
+    for action in actions:
+        step(batch, action)
 
 
 def result_of(block: Sequence[Instruction], register: int | None = None, **room: object) -> int:

@@ -165,6 +165,13 @@ def test_1_3_forward_enters_unless_solid_or_taken(play: Folder) -> None:
     assert play(door.format("closed")).step("forward").at("agent") == [1, 1]
     assert play("cast: {agent: {facing: up}}").step("forward").at("agent") == [1, 1]
     assert play("cast: {ann: {at: [2, 1]}}").step("forward").at("agent") == [1, 1]
+    outside = play("""
+        objects: {door: {type: door, at: [0, 1], state: open}}
+        cast: {agent: {facing: left}}
+    """)
+    assert outside.step("forward").step("forward").at("agent") == [0, 1], (
+        "through the door, but not off the room"
+    )
 
 
 def test_1_4_hidden_npcs_do_not_stop_the_agent(play: Folder) -> None:
@@ -203,7 +210,7 @@ def test_1_7_a_toggle_changes_the_object_ahead(play: Folder) -> None:
 @pytest.mark.parametrize("kind", ["door", "box"])
 def test_1_8_a_locked_object_ignores_a_toggle(play: Folder, kind: str) -> None:
     run = play(f"objects: {{thing: {{type: {kind}, at: [2, 1], state: locked}}}}").step("toggle")
-    assert run.status("thing") == "locked"
+    assert (run.status("thing"), run.state["last"]["poked"]) == ("locked", "thing")
 
 
 def test_1_9_a_one_way_object_never_changes_back(play: Folder) -> None:
@@ -235,6 +242,7 @@ def test_1_12_held_back_by_another_of_its_group(play: Folder, kind: str, use: st
     before = run.state["things"][0]["state"]
     run.step(use).step("right").step(use)
     assert [thing["state"] == before for thing in run.state["things"]] == [False, True]
+    assert run.state["last"]["poked"] == ("things[1]" if use == "toggle" else None)
 
 
 def test_1_13_top_the_last_in_the_file_is_toggled_and_seen(play: Folder) -> None:
@@ -295,6 +303,8 @@ def test_2_2_expires_when_all_its_steps_are_counted(play: Folder) -> None:
     assert (run.status("lever"), run.status("gate")) == ("up", "open")
     run.step()
     assert (run.status("lever"), run.status("gate")) == ("spent", "closed")
+    short = play("objects: {lever: {type: lever, at: [2, 1], timer: 1}}").step("toggle")
+    assert (short.status("lever"), short.state["lever"]["timer"]) == ("spent", 0)
 
 
 def test_2_3_zero_in_any_other_status(play: Folder) -> None:
@@ -642,9 +652,9 @@ def test_4_5_the_agent_hears_itself_first_if_at_all(play: Folder) -> None:
         frames: {{talk: {{states: {{s: {{then: [{{say: Hi.}}]}}}}}}}}
         cast: {{ann: {{at: [5, 5], frame: talk}}}}
     """
-    heard = play(text.format("true")).step(None, "Say hello").info["utterance"].splitlines()
-    assert [line.split(": ")[-1] for line in heard] == ["Say hello", "Hi."]
-    assert play(text.format("false")).step(None, "Say hello").info["utterance"] == "Ann: Hi."
+    heard = play(text.format("true")).step(None, "Say bye").info["utterance"].splitlines()
+    assert [line.split(": ")[-1] for line in heard] == ["Say bye", "Hi."]
+    assert play(text.format("false")).step(None, "Say bye").info["utterance"] == "Ann: Hi."
 
 
 def test_4_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
@@ -980,7 +990,13 @@ def test_5_22_a_rule_computes_before_it_acts(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(
-    ("effects", "status"), [("door.open, door.lock", "locked"), ("door.lock, door.open", "open")]
+    ("effects", "status"),
+    [
+        ("door.open, door.lock", "locked"),
+        ("door.lock, door.open", "open"),
+        ("door.open, door.unlock", "open"),
+        ("door.lock, door.unlock", "closed"),
+    ],
 )
 def test_5_23_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
     run = play(f"""
@@ -1094,12 +1110,16 @@ CHOICES = [
     "first(d in doors where d.locked)",
     "nearest(d in doors where d.locked to self)",
 ]
+OF_CELLS = [choice.replace("d in doors where d.locked", "c in cells where c.x > 20") for choice in CHOICES]
 
 
-@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("choice", [*CHOICES, *OF_CELLS])
 def test_5_30_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
+    undrawn = choice.replace("pick", "first").replace("self", "agent")
     run = play(f"""
-        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+        objects:
+          doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}
+          gate: {{type: door, at: [6, 3], locked: not agent.at({undrawn})}}
         frames:
           look:
             let: {{a: 0, b: 0, c: 0}}
@@ -1114,6 +1134,7 @@ def test_5_30_a_condition_is_false_where_nothing_is_found(play: Folder, choice: 
         cast: {{ann: {{at: [5, 5], frame: look}}}}
     """).step()
     assert [run.value(f"ann.{name}") for name in "abc"] == [0, 0, 1]
+    assert run.status("gate") == "closed"
 
 
 @pytest.mark.parametrize("choice", CHOICES)
@@ -1140,7 +1161,7 @@ def test_5_31_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: 
     assert (run.state["ann"]["state"], run.value("ann.b")) == ("gone_on", 0)
 
 
-@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("choice", [*CHOICES, *OF_CELLS])
 def test_5_32_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.program import FrameColumn, Header, Op
-from socialai_dsl.semantics.plans import BeliefPlan, CheckedScenario, Drawn, OutcomePlan, RulePlan
+from socialai_dsl.semantics.plans import BeliefPlan, CheckedScenario, Drawn, OutcomePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
@@ -17,19 +17,13 @@ from socialai_dsl.semantics.terms import (
     CellOf,
     Compare,
     Const,
-    FieldOf,
     Quantification,
-    Read,
-    Sees,
     Type,
     World,
 )
 from tests.socialai_dsl.compiler.workbench import (
-    AGENT,
     BOX,
     DOOR,
-    GUIDE,
-    SPAN,
     cell,
     code,
     compiled,
@@ -38,7 +32,6 @@ from tests.socialai_dsl.compiler.workbench import (
     sited,
     start,
     step,
-    with_let,
     workbench,
     worth,
     x_of,
@@ -61,28 +54,6 @@ def believing(when: Any, value: Any, type_: Type = COLUMN) -> CheckedScenario:
 
 def belief(env: Any) -> Any:
     return env.describe()["guide"]["believes"]["it"]
-
-
-def test_a_belief_follows_what_is_seen() -> None:
-    """Guide looks left from (4, 3): it sees where the agent is while that is in front of it."""
-    seen = Sees(entity(GUIDE), entity(AGENT))
-    env = start(
-        believing(seen, FieldOf(COLUMN, entity(AGENT), "x")), {"agent": {"at": [3, 4], "facing": "right"}}
-    )
-    assert belief(env) == 3
-    for _ in range(3):
-        step(env, "forward")
-    # It stands behind the guide now, who takes it to be where it was seen last.
-    assert env.describe()["agent"]["at"] == [5, 4]
-    assert belief(env) == 4
-
-
-def test_a_belief_without_a_condition_always_follows() -> None:
-    env = start(
-        believing(None, FieldOf(COLUMN, entity(AGENT), "x")), {"agent": {"at": [3, 4], "facing": "right"}}
-    )
-    step(env, "forward")
-    assert belief(env) == 4
 
 
 def test_a_belief_that_finds_nothing_stays() -> None:
@@ -146,28 +117,9 @@ def ending(graded: Any, success: bool = True) -> CheckedScenario:
     return replace(workbench(), outcomes=(plan,), slope=0)
 
 
-@pytest.mark.parametrize(("per_cent", "share"), [(50, 0.5), (130, 1.0), (-3, 0.0)])
-def test_a_graded_outcome_is_computed_at_the_end(per_cent: int, share: float) -> None:
-    checked = with_let(
-        ending(Read(Type("int", -9, 200), "let.grade")), "let.grade", number(per_cent), Type("int", -9, 200)
-    )
-    assert earned(checked, 2) == [0.0, pytest.approx(share)]
-
-
 def test_a_graded_failure_earns_nothing() -> None:
     assert earned(ending(number(50), success=False), 2) == [0.0, 0.0]
     assert Op.END_GRADED not in {row[0] for row in compiled(ending(number(50), success=False)).code.tolist()}
-
-
-def test_the_slope_of_the_reward() -> None:
-    full = ending(None)
-    assert earned(replace(full, slope=500), 2) == [0.0, pytest.approx(1 - 0.5 * 2 / 20)]
-
-
-def test_every_step_and_rules_add_to_the_reward() -> None:
-    bonus = RulePlan("bonus", "rules[0]", SPAN, when=sited(Compare("==", NOW, number(2))), reward=-25)
-    checked = replace(workbench(), each_step=-10_000, rules=(bonus,))
-    assert earned(checked, 3) == [pytest.approx(-0.01), pytest.approx(-0.26), pytest.approx(-0.01)]
 
 
 @pytest.mark.parametrize("channels", [4, 6])

@@ -10,7 +10,6 @@ from socialai_dsl.program import Op
 from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.terms import Compare, Const, FieldOf, Read, Type, World
 from tests.socialai_dsl.compiler.workbench import (
-    cell,
     code,
     compiled,
     entity,
@@ -25,7 +24,6 @@ from tests.socialai_dsl.compiler.workshop import (
     AGENT,
     APPLE,
     CHEST,
-    GUIDE,
     MARBLE,
     OTHER_CHEST,
     changed,
@@ -79,24 +77,6 @@ def test_a_layout_that_gives_its_place_lays_it_there(filled: CheckedScenario) ->
     assert start(filled, {"apple": {"at": [6, 1]}}).describe()["apple"]["at"] == [6, 1]
 
 
-def test_an_opened_box_is_replaced_by_its_content(filled: CheckedScenario) -> None:
-    env = start(filled)
-    step(env, "toggle")
-    after = env.describe()
-    assert after["chests"][0]["at"] is None
-    assert after["apple"]["at"] == [2, 3]
-    step(env, "toggle")
-    assert env.describe()["apple"]["state"] == "eaten"
-
-
-def test_an_opened_box_without_content_stays(filled: CheckedScenario) -> None:
-    env = start(with_content(filled, APPLE, OTHER_CHEST))
-    step(env, "toggle")
-    after = env.describe()
-    assert (after["chests"][0]["at"], after["chests"][0]["state"]) == ([2, 3], "opened")
-    assert after["apple"]["at"] is None
-
-
 def test_several_contents_are_all_released(filled: CheckedScenario) -> None:
     both = with_content(filled, MARBLE, CHEST)
     both = changed(both, CHEST, contains=(APPLE, MARBLE))
@@ -104,88 +84,6 @@ def test_several_contents_are_all_released(filled: CheckedScenario) -> None:
     step(env, "toggle")
     after = env.describe()
     assert after["apple"]["at"] == after["marble"]["at"] == [2, 3]
-
-
-def test_reveal_opens(filled: CheckedScenario) -> None:
-    env = start(with_rules(filled, rule(at(2), effect("reveal", CHEST))))
-    step(env)
-    assert env.describe()["apple"]["at"] is None
-    step(env)
-    assert env.describe()["apple"]["at"] == [2, 3]
-
-
-def test_move_into_takes_it_out_of_the_room(filled: CheckedScenario) -> None:
-    moved = effect("move_into", APPLE, value=entity(OTHER_CHEST))
-    checked = with_rules(filled, rule(at(1), moved), rule(at(3), effect("reveal", OTHER_CHEST)))
-    env = start(checked, {"apple": {"at": [6, 1]}})
-    step(env)
-    assert env.describe()["apple"]["at"] is None
-    step(env)
-    step(env)
-    after = env.describe()
-    assert after["apple"]["at"] == [4, 3]
-    assert after["chests"][1]["at"] is None
-
-
-def test_put_shares_a_cell(filled: CheckedScenario) -> None:
-    checked = with_rules(
-        workshop(),
-        rule(at(1), effect("put", APPLE, value=entity(CHEST))),
-        rule(at(2), effect("put", MARBLE, value=cell(3, 2))),
-    )
-    env = start(checked)
-    step(env)
-    assert env.describe()["apple"]["at"] == [2, 3]
-    step(env)
-    assert env.describe()["marble"]["at"] == [3, 2]
-
-
-def test_a_body_is_put_where_it_can_stand(filled: CheckedScenario) -> None:
-    checked = with_rules(
-        workshop(),
-        rule(at(1), effect("put", GUIDE, value=entity(CHEST))),
-        rule(at(2), effect("put", GUIDE, value=cell(3, 2))),
-    )
-    env = start(checked)
-    step(env)
-    assert env.describe()["guide"]["at"] == [7, 5]
-    step(env)
-    assert env.describe()["guide"]["at"] == [3, 2]
-
-
-def test_reset_puts_contents_back(filled: CheckedScenario) -> None:
-    env = start(with_rules(filled, rule(at(3), effect("reset", CHEST))))
-    before = env.describe()
-    step(env, "toggle")
-    step(env, "toggle")
-    assert env.describe()["chests"][0]["at"] is None
-    step(env)
-    after = env.describe()
-    assert after["chests"] == before["chests"]
-    assert after["apple"] == before["apple"] | {"state": "eaten"}
-    step(env, "toggle")
-    assert env.describe()["apple"]["at"] == [2, 3]
-
-
-def test_reset_puts_back_place_and_direction(filled: CheckedScenario) -> None:
-    checked = with_rules(
-        workshop(),
-        rule(at(1), effect("put", MARBLE, value=cell(3, 2)), effect("put", GUIDE, value=cell(5, 2))),
-        rule(at(2), effect("vanish", APPLE)),
-        rule(at(3), effect("reset", MARBLE, APPLE, GUIDE)),
-    )
-    env = start(checked)
-    before = env.describe()
-    step(env)
-    step(env)
-    between = env.describe()
-    assert between["marble"]["at"] == [3, 2]
-    assert between["guide"]["at"] == [5, 2]
-    assert between["apple"]["at"] is None
-    step(env)
-    after = env.describe()
-    for thing in ("marble", "apple", "guide"):
-        assert after[thing]["at"] == before[thing]["at"]
 
 
 def test_reset_keeps_only_what_can_change() -> None:

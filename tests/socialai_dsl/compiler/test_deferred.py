@@ -73,42 +73,6 @@ FORWARD = activity("forward")
 FREE = {"guide": {"at": [4, 2], "facing": "left"}}
 
 
-def test_what_is_set_has_the_value_of_before_the_move() -> None:
-    column = sited(FieldOf(COLUMN, entity(GUIDE), "x"))
-    env = start(scenario(first(FORWARD, sets=(Assignment("guide.n", column),))), FREE)
-    step(env)
-    assert guide(env)[0] == [3, 2]
-    assert env.describe()["let"]["guide.n"] == 4
-    step(env)
-    assert env.describe()["let"]["guide.n"] == 3
-
-
-def test_goto_leaves_clock_0() -> None:
-    env = start(scenario(first(FORWARD, goto="moved")), FREE)
-    step(env)
-    assert guide(env) == ([3, 2], "moved", 0)
-    step(env)
-    assert guide(env) == ([3, 2], "moved", 1)
-
-
-def test_what_is_said_has_the_value_of_before_the_move() -> None:
-    line = Line(("At ", FieldOf(COLUMN, entity(GUIDE), "x")), "say", SPAN)
-    env = start(scenario(first(FORWARD, say=line)), FREE)
-    step(env)
-    step(env)
-    assert env.describe()["heard"] == ["Guide: At 4", "Guide: At 3"]
-
-
-def test_effects_come_after_the_move() -> None:
-    """The guide cannot go through a door that its own rule opens."""
-    opening = Effect("open", (entity(DOOR),), SPAN)
-    env = start(scenario(first(FORWARD, causes=(opening,))), {"guide": {"at": [5, 2], "facing": "right"}})
-    step(env)
-    assert (guide(env)[0], env.describe()["door"]["state"]) == ([5, 2], "open")
-    step(env)
-    assert guide(env)[0] == [6, 2]
-
-
 def test_a_target_is_the_one_of_before_the_move() -> None:
     """It would be the door once the guide has moved."""
     moved = Compare("<=", FieldOf(COLUMN, entity(GUIDE), "x"), number(4))

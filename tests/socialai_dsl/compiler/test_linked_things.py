@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
 from socialai_dsl.compiler.folding import ChangeAnalysis, When
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Flag, Header, Program, TypeColumn
@@ -36,7 +34,6 @@ from tests.socialai_dsl.compiler.workshop import (
     GUIDE,
     LEVER,
     MARBLE,
-    OTHER_CHEST,
     OTHER_LEVER,
     changed,
     effect,
@@ -45,7 +42,6 @@ from tests.socialai_dsl.compiler.workshop import (
     workshop,
 )
 
-NEXT_TO_LEVER = {"agent": {"at": [1, 1], "facing": "up"}}
 NEXT_TO_OTHER_LEVER = {"agent": {"at": [3, 1], "facing": "up"}}
 NOW = World(Type("int", 0, 20), "t")
 
@@ -55,37 +51,6 @@ def gate(env: ScenarioEnv) -> str:
 
 
 # --- opens ---
-
-
-def test_a_gate_is_open_exactly_while_something_that_opens_it_is_active() -> None:
-    env = start(changed(workshop(), LEVER, opens=(GATE,)), NEXT_TO_LEVER)
-    assert gate(env) == "closed"
-    step(env, "toggle")
-    assert gate(env) == "open"
-
-
-def test_a_gate_closes_when_the_last_that_opens_it_is_idle() -> None:
-    both = changed(changed(workshop(), LEVER, opens=(GATE,)), OTHER_LEVER, opens=(GATE,))
-    spent = Const(Type("status", 0, 2, ("down", "up", "spent")), 2)
-    checked = with_rules(
-        both,
-        rule(Compare("==", NOW, number(2)), effect("become", LEVER, value=spent)),
-        rule(Compare("==", NOW, number(3)), effect("become", OTHER_LEVER, value=spent)),
-    )
-    env = start(checked, {"levers": [{"state": "up"}, {"state": "up"}]})
-    seen = [gate(env)]
-    for _ in range(3):
-        step(env)
-        seen.append(gate(env))
-    assert seen == ["open", "open", "open", "closed"]
-
-
-def test_what_left_the_room_opens_nothing() -> None:
-    checked = with_rules(changed(workshop(), LEVER, opens=(GATE,)), rule(None, effect("vanish", LEVER)))
-    env = start(checked, {"levers": [{"state": "up"}, {}]})
-    assert gate(env) == "open"
-    step(env)
-    assert gate(env) == "closed"
 
 
 def test_links_do_nothing_where_nothing_has_to_change() -> None:
@@ -99,32 +64,6 @@ def test_links_do_nothing_where_nothing_has_to_change() -> None:
 # --- timers ---
 
 
-@pytest.mark.parametrize("steps", [1, 3])
-def test_an_active_status_expires(steps: int) -> None:
-    env = start(changed(workshop(), LEVER, timer=steps), NEXT_TO_LEVER)
-    step(env, "toggle")
-    seen = [env.describe()["levers"][0]["state"]]
-    for _ in range(steps):
-        step(env)
-        seen.append(env.describe()["levers"][0]["state"])
-    assert seen == ["up"] * (steps - 1) + ["spent"] * 2
-    assert env.describe()["levers"][0]["timer"] == 0
-
-
-def test_a_timer_starts_anew_with_each_activation() -> None:
-    idle = Const(Type("status", 0, 2, ("down", "up", "spent")), 0)
-    checked = with_rules(
-        changed(workshop(), LEVER, timer=3),
-        rule(Compare("==", NOW, number(2)), effect("become", LEVER, value=idle)),
-    )
-    env = start(checked, NEXT_TO_LEVER)
-    timers = []
-    for word in ("toggle", "none", "none", "toggle", "none"):
-        step(env, word)
-        timers.append(env.describe()["levers"][0]["timer"])
-    assert timers == [1, 2, 0, 1, 2]
-
-
 def test_without_timers_nothing_ticks() -> None:
     program = compiled(workshop())
     assert program.header(Header.TICK_PC) == 0
@@ -132,14 +71,6 @@ def test_without_timers_nothing_ticks() -> None:
 
 
 # --- exclusive ---
-
-
-def test_one_of_a_group_holds_back_the_others() -> None:
-    group = (LEVER, OTHER_LEVER)
-    both = changed(changed(workshop(), LEVER, exclusive=group), OTHER_LEVER, exclusive=group)
-    env = start(both, {**NEXT_TO_OTHER_LEVER, "levers": [{"state": "up"}, {}]})
-    step(env, "toggle")
-    assert env.describe()["levers"][1]["state"] == "down"
 
 
 def test_who_is_held_back_is_free_again_once_the_other_is_back() -> None:
@@ -175,19 +106,6 @@ def test_types_say_what_a_push_does() -> None:
         int(by_rolling.words[at + EntityColumn.COLUMNS * n]) for n in range(len(by_rolling.entities))
     ]
     assert pushed_by == [int(n == GENERATOR) for n in range(len(by_rolling.entities))]
-
-
-def test_a_pushed_marble_rolls_until_it_presses_something() -> None:
-    checked = changed(workshop(), GENERATOR, pushed_by_rolling=True)
-    env = start(checked, {"agent": {"at": [6, 5], "facing": "left"}})
-    step(env, "forward")
-    places = [env.describe()["marble"]["at"]]
-    for _ in range(4):
-        step(env)
-        places.append(env.describe()["marble"]["at"])
-    after = env.describe()
-    assert places == [[4, 5], [3, 5], [2, 5], [2, 5], [2, 5]]
-    assert (after["marble"]["state"], after["generator"]["state"]) == ("still", "pressed")
 
 
 def push(layout: dict[str, Any], steps: int) -> list[dict[str, Any]]:
@@ -237,25 +155,6 @@ def test_fleeing() -> None:
         step(env)
         places.append(env.describe()["guide"]["at"])
     assert places == [[4, 2], [5, 2], [6, 2], [7, 2]]
-
-
-def test_pointing_and_letting_the_arm_sink() -> None:
-    pointing = state("pointing", activity("point", Const(DIRECTION, 2)))
-    letting = replace(
-        rule(None), name="idle.pointing.first[0]", after=2, do=activity("stop_pointing"), when=None
-    )
-    way = FieldOf(Type("int", 0, 4), entity(GUIDE), "pointing")
-    checked = with_rules(
-        with_guide(workshop(), replace(pointing, first=(letting,))),
-        rule(Compare("==", way, number(3)), effect("reveal", CHEST)),
-        rule(Compare("==", way, number(0)), effect("reveal", OTHER_CHEST)),
-    )
-    env = start(checked)
-    seen = []
-    for _ in range(3):
-        step(env)
-        seen.append([chest["state"] for chest in env.describe()["chests"]])
-    assert seen == [["opened", "shut"]] * 2 + [["opened", "opened"]]
 
 
 # --- when conditions can change ---

@@ -5,30 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 
 from socialai_dsl.program import Header, LineColumn
-from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Effect, RulePlan, StepPlan
-from socialai_dsl.semantics.terms import ACTION, Compare, Const, Pattern, Read, Select, Term, Type
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, RulePlan
+from socialai_dsl.semantics.terms import ACTION, Compare, Const, Pattern, Select, Term, Type
 from tests.socialai_dsl.compiler.workbench import (
-    BOX,
     DIE,
     GUIDE,
     SPAN,
     STATUE,
     activity,
     compiled,
-    entity,
     listed,
     sited,
     start,
     state,
     step,
     with_guide,
-    with_let,
     workbench,
 )
 
 TEXTS = ("Go up", "Go down", "Look up", "Look down")
 UTTERANCE = Type("utterance", 0, 4, ("", *TEXTS))
-LEFT, RIGHT, FORWARD, NONE = (Const(ACTION, value) for value in (0, 1, 2, 7))
+LEFT, RIGHT, FORWARD = (Const(ACTION, value) for value in (0, 1, 2))
 
 
 def say(value: int) -> Const:
@@ -53,33 +50,6 @@ def turns(checked: CheckedScenario, count: int) -> list[tuple[list[int], str, st
     return seen
 
 
-def test_moves_and_utterances_in_turn_and_then_nothing() -> None:
-    assert turns(dancing(*DANCE), 5) == [
-        ([4, 3], "down", "NA"),
-        ([4, 4], "down", "Guide: Look down"),
-        ([4, 4], "left", "Guide: Go up"),
-        ([4, 4], "left", "NA"),
-        ([4, 4], "left", "NA"),
-    ]
-
-
-def test_drawn_elements() -> None:
-    checked = with_let(
-        dancing(Read(ACTION, "let.d[0].move"), Read(UTTERANCE, "let.d[0].utterance")), "let.d[0].move", RIGHT
-    )
-    for number, heard in enumerate(("NA", *(f"Guide: {text}" for text in TEXTS))):
-        drawn = with_let(checked, "let.d[0].utterance", say(number))
-        assert turns(drawn, 1) == [([4, 3], "up", heard)]
-
-
-def test_a_blocked_move_counts_all_the_same() -> None:
-    args = (LEFT, say(0), FORWARD, say(0), FORWARD, say(2), FORWARD, say(3))
-    assert [turn[0] for turn in turns(dancing(*args), 4)] == [[4, 3], [4, 4], [4, 4], [4, 4]], (
-        "the statue is in the way"
-    )
-    assert [turn[2] for turn in turns(dancing(*args), 4)][2:] == ["Guide: Go down", "Guide: Look up"]
-
-
 def test_without_names_only_the_text_is_heard() -> None:
     assert [turn[2] for turn in turns(replace(dancing(*DANCE), names_shown=False), 2)] == ["NA", "Look down"]
 
@@ -96,23 +66,6 @@ def test_a_drawn_name() -> None:
         env = start(named, {"let": {"die": die}})
         step(env)
         assert step(env)["utterance"] == f"{words[die // 2]}: Look down"
-
-
-def test_a_step_ends_with_its_sequence() -> None:
-    base = workbench()
-    gone = Effect("vanish", (entity(BOX),), SPAN)
-    steps = (
-        StepPlan("first", None, activity("perform", *DANCE), SPAN),
-        StepPlan("second", None, activity("stay"), SPAN, duration=1, causes=(gone,)),
-    )
-    frame = replace(base.frames[0], states=(), steps=steps)
-    env = start(replace(base, frames=(frame,)))
-    states = []
-    for _ in range(4):
-        step(env)
-        states.append(env.describe()["guide"]["state"])
-    assert states == ["step0", "step0", "step1", "finished"]
-    assert env.describe()["box"].get("gone") is True
 
 
 def test_a_rule_of_first_performs_by_the_clock_of_its_state() -> None:

@@ -80,7 +80,7 @@ def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, i
     """One instruction where the numbers fit into it, and the same number as where the others are named."""
     numbers = range(first, first + size)
     items = tuple(Const(NUMBER, n) for n in numbers)
-    for one in {first, first + size // 2, first + size - 1}:
+    for one in {first, first + size // 2, first + size - 1} if size < 9 else {first + size // 2}:
         but_one = Compare("!=", ITEM, Const(Type("int", one, one), one))
         pick = Quantification(NUMBER, "pick", "n", items, but_one)
         program = compiled(with_let(workbench(), "let.answer", pick))

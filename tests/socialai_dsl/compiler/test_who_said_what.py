@@ -15,7 +15,6 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
     Const,
-    FieldOf,
     HeardNoun,
     Line,
     Operation,
@@ -25,12 +24,10 @@ from socialai_dsl.semantics.terms import (
     Speaker,
     Term,
     Type,
-    World,
 )
 from tests.socialai_dsl.compiler.workbench import (
     AGENT,
     GUIDE,
-    NUMBER,
     SPAN,
     STATUE,
     activity,
@@ -85,53 +82,7 @@ def talking(*statues: RulePlan, hears: tuple[Pattern, ...] = (GO, LOOK_UP), **mo
     )
 
 
-def noted(env: Any) -> tuple[Any, Any]:
-    let = env.describe()["let"]
-    return let["guide.who"], let["guide.which"]
-
-
 # --- Speaker and HeardNoun ---
-
-
-def test_what_the_agent_says_has_its_noun() -> None:
-    env = start(talking(), {"let": {"guide.who": "statue"}})
-    step(env, "none", 1)  # Go down
-    assert noted(env) == ("agent", "down")
-
-
-def test_what_an_npc_says_is_heard_in_the_next_turn() -> None:
-    env = start(talking(rule("statue", "then[0]", say=said("Go down"), once=True)))
-    step(env)
-    assert noted(env) == ("agent", "up")
-    step(env)
-    assert noted(env) == ("statue", "down")
-
-
-def test_the_first_of_several_counts() -> None:
-    env = start(talking(rule("statue", "then[0]", say=said("Go down"), once=True)))
-    step(env)
-    step(env, "none", 0)  # Go up: the statue spoke first, but the agent comes first
-    assert noted(env) == ("agent", "up")
-
-
-def test_without_a_noun_the_rule_is_false() -> None:
-    env = start(talking(rule("statue", "then[0]", say=said("Look up"), once=True)))
-    for _ in range(3):
-        step(env)
-    assert noted(env) == ("agent", "up")
-    assert "guide.talk.waiting.then[0]" not in {
-        name for name, count in env.counters()["rules"].items() if count
-    }
-
-
-def test_the_speaker_in_a_condition() -> None:
-    gone = Compare("==", FieldOf(NUMBER, WHO, "x"), number(4))
-    checked = talking(rule("statue", "then[0]", say=said("Go down"), once=True), when=sited(gone))
-    env = start(checked)
-    step(env, "none", 0)  # the agent is at x = 2
-    assert noted(env) == ("agent", "up")
-    step(env)
-    assert noted(env) == ("statue", "down")
 
 
 def test_inboxes_hold_who_and_what_only_where_somebody_asks() -> None:
@@ -141,6 +92,18 @@ def test_inboxes_hold_who_and_what_only_where_somebody_asks() -> None:
         assert h(Header.FLAGS) & Flag.HEARD_BY == flag
         assert h(Header.HEARD) - h(Header.INBOX) == 2 * size
     assert (asked.header(Header.CLASS_SETS), unasked.header(Header.CLASS_SETS)) == (1, 0)
+
+
+def test_an_inbox_keeps_nothing_of_what_was_heard() -> None:
+    env = start(talking(rule("statue", "then[0]", say=said("Go down"), once=True)))
+    first = env.program.header(Header.INBOX)
+    inbox = env._table.state.registers[0, first : first + 4]
+    step(env)
+    assert inbox.tolist() == [1, 2, STATUE, 1], (
+        "one thing of class 2, which the statue said, with the second noun"
+    )
+    step(env)
+    assert inbox.tolist() == [0, 0, 0, 0]
 
 
 def nouns_of(program: Program) -> dict[str, int]:
@@ -191,16 +154,6 @@ def test_lines_of_the_agent_have_the_nouns_of_their_pairs() -> None:
     assert list(lines.values()) == [0, 1, 0, 1]
 
 
-def test_a_noun_that_the_agent_did_not_say_is_none() -> None:
-    """The register says -1 while the agent is silent: a rule that needs the noun is false then."""
-    which = (Assignment("guide.which", sited(World(NOUN, "noun"))),)
-    env = start(talking(sets=which, hears=()), {"let": {"guide.which": "down"}})
-    step(env)
-    assert noted(env)[1] == "down"
-    step(env, "none", 0)
-    assert noted(env)[1] == "up"
-
-
 # --- SaidBy ---
 
 
@@ -236,18 +189,6 @@ def test_what_an_npc_says_is_noticed_in_the_same_step_only(
     for _ in range(3):
         step(env)
     assert env.describe()["let"]["noticed"] == times
-
-
-def test_of_two_lines_of_a_step_the_first_is_said() -> None:
-    first = rule("statue", "then[0]", say=said("Go up"), once=True, goto_now="again")
-    again = StatePlan("again", (), activity("stay"), (rule("statue", "again", say=said("Go down")),), SPAN)
-    checked = watching(SaidBy(STATUE, GO_DOWN), first)
-    guide, statue = checked.frames
-    env = start(replace(checked, frames=(guide, replace(statue, states=(*statue.states, again)))))
-    step(env)
-    assert env.describe()["let"]["noticed"] == 0
-    step(env)
-    assert env.describe()["let"]["noticed"] == 1
 
 
 def test_a_line_with_values_in_it() -> None:

@@ -11,16 +11,11 @@ from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import PIN_NONE, Key, no_pins
-from socialai_dsl.program import Body, Field, Op, Program, Register
+from socialai_dsl.program import Body, Op, Program, Register
 from tests.assembly import (
     Assembly,
-    Instruction,
-    batch_of,
     constant,
-    entity_register,
     part_of,
-    step,
-    temporary,
 )
 
 WON, LOST, TIMEOUT = 0, 1, 3
@@ -211,34 +206,3 @@ def test_acts_have_keys_of_their_own() -> None:
     assert keys[0] == key
     assert len(set(keys)) == 64
     assert not set(keys[1:]) & {draws.attempt_key(key, attempt) for attempt in range(64)}
-
-
-@pytest.mark.parametrize(("slope", "expected"), [(900, 1 - 0.9 * 3 / 8), (0, 1.0), (1000, 1 - 3 / 8)])
-def test_the_reward_of_success_falls_as_the_program_says(slope: int, expected: float) -> None:
-    batch = batch_of(member(0, slope=slope))
-    play(batch, WAIT)
-    play(batch, WAIT)
-    assert play(batch, WIN) == (expected, 1)
-
-
-def test_rewards_of_every_step_and_of_rules() -> None:
-    rules: list[Instruction] = [
-        (Op.IF_EQ, Register.T, constant(2), 2),
-        (Op.REWARD, constant(25)),
-        (Op.REWARD, constant(-5)),
-    ]
-    batch = batch_of(member(0, each_step=-1500, rules=rules, slope=0))
-    assert play(batch, WAIT)[0] == pytest.approx(-0.0015)
-    assert play(batch, WAIT)[0] == pytest.approx(0.2 - 0.0015)
-    assert play(batch, WAIT)[0] == pytest.approx(-0.0015), "what rules gave is gone"
-    assert play(batch, WIN)[0] == pytest.approx(1 - 0.0015)
-
-
-@pytest.mark.parametrize(("percent", "expected"), [(40, 0.4), (-3, 0.0), (250, 1.0)])
-def test_an_end_whose_reward_is_computed(percent: int, expected: float) -> None:
-    end = [(Op.LOAD, temporary(0), constant(percent)), (Op.END_GRADED, LOST, temporary(0))]
-    batch = batch_of(Assembly(outcomes={(-1, -1): end}, slope=0).program())
-    step(batch)
-    assert batch.ports.reward[0] == expected
-    assert batch.state.registers[0, Register.OUTCOME] == LOST
-    assert batch.state.registers[0, entity_register(0, Field.X)] == 2

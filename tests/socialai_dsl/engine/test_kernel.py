@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.batch import Batch, LinkedProgram
+from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import Body, Field, Header, Op, Program, Register
-from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, temporary
+from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, part_of, temporary
 
 
 def lively(horizon: int = 6) -> Program:
@@ -177,20 +178,7 @@ def test_ended_rows_wait_where_resets_are_the_callers() -> None:
 
 
 def mixed(programs: list[Program], pools: list[list[int]], pool_of_row: list[int]) -> Batch:
-    parts = [
-        LinkedProgram(
-            program.words,
-            1,
-            range(4 * i, 4 * i + 4),
-            [*range(7), Body.NONE],
-            range(2),
-            [range(3)],
-            [[0, 1], [0, 1]],
-            range(22),
-            [False] * 4,
-        )
-        for i, program in enumerate(programs)
-    ]
+    parts = [part_of(program, 4 * i) for i, program in enumerate(programs)]
     length = max(program.header(Header.TOKENS) for program in programs)
     batch = Batch(parts, pools, pool_of_row, length)
     batch.state.keys[:, Key.SEED] = 7
@@ -235,16 +223,11 @@ def test_a_pool_draws_its_program_anew_in_every_episode() -> None:
 def test_actions_of_a_larger_space_that_a_program_lacks() -> None:
     program = Assembly(at=((2, 2),), lines=(("x", (2,), 1),)).program()
     # The batch's order: an action the program lacks, forward, none; a template it lacks, its second.
-    part = LinkedProgram(
-        program.words,
-        1,
-        range(4),
-        [Body.NONE, Body.FORWARD, Body.NONE],
-        [-1, 1],
-        [[0, -1, 2]],
-        [[0, 1], [0, 1]],
-        range(22),
-        [False] * 4,
+    part = replace(
+        part_of(program),
+        actions=[Body.NONE, Body.FORWARD, Body.NONE],
+        templates=[-1, 1],
+        slots=[[0, -1, 2]],
     )
     batch = Batch([part], [[0]], [0], 8)
     batch.reset()

@@ -7,7 +7,7 @@ import pytest
 
 from socialai_dsl.engine.views import view_table
 from socialai_dsl.program import Field, Flag, Op, pack_cell
-from tests.assembly import HIDDEN, Assembly, batch_of, constant, entity_register, step
+from tests.assembly import Assembly, batch_of, constant, entity_register, step
 
 
 @pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 9), (30, 4)])
@@ -68,15 +68,6 @@ def test_what_is_seen() -> None:
     assert image[1, 5].tolist() == [2, 5, 0, 0], "the wall"
     assert image[3, 2].tolist() == [1, 0, 0, 0], "beyond the room, on the canvas"
     assert image[3, 0].tolist() == [2, 5, 0, 0], "off the canvas"
-
-
-def test_hidden_npcs_leave_no_trace() -> None:
-    shown, hidden = (
-        batch_of(Assembly(at=((1, 2), (2, 2)), npcs=1, flags=flags).program()).state.image[0]
-        for flags in (0, HIDDEN)
-    )
-    assert hidden[3 * 7 + 5] == pack_cell(1)
-    assert (shown != hidden).sum() == 1
 
 
 def test_an_agent_without_a_place_sees_nothing() -> None:

@@ -72,7 +72,10 @@ def test_guards(index: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "tests",
-    [["tests/socialai_dsl/engine"], ["tests/test_agreement.py", "-k", "talkitout or walkers"]],
+    [
+        ["tests/socialai_dsl/engine", "tests/test_one_step.py", "tests/test_odd_moments.py"],
+        ["tests/test_agreement.py", "-k", "talkitout or walkers"],
+    ],
     ids=["engine", "agreement"],
 )
 def test_plain_python_does_the_same_within_bounds(tests: list[str]) -> None:

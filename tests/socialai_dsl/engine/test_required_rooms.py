@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from socialai_dsl import draws
-from socialai_dsl.engine.batch import Batch, LinkedProgram
+from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import RoomError, Task
 from socialai_dsl.engine.state import ATTEMPTS, PIN_NONE, Key
 from socialai_dsl.program import Body, Field, Op, Program, Register
-from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, temporary
+from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, part_of, temporary
 
 OWN = Assembly(at=(None,)).own
 SITE = draws.site("a")
@@ -118,27 +118,12 @@ def test_the_last_attempt_counts() -> None:
     assert batch.state.registers[0, [Register.ATTEMPT, OWN]].tolist() == [ATTEMPTS - 1, 59]
 
 
-def part_of(program: Program, name: str = "") -> LinkedProgram:
-    return LinkedProgram(
-        program.words,
-        1,
-        range(4),
-        [*range(7), Body.NONE],
-        range(2),
-        [range(3)],
-        [[0, 1], [0, 1]],
-        range(22),
-        [False] * 4,
-        name,
-    )
-
-
 NEVER = drawn(1000, 1000, horizon=2)
 
 
 def test_a_room_that_never_fits_is_reported_and_left_sound() -> None:
     rows = 200
-    batch = Batch([part_of(NEVER, "picky"), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8)
+    batch = Batch([part_of(NEVER, name="picky"), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8)
     batch.state.keys[:, Key.SEED] = 7
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     with pytest.raises(

@@ -93,17 +93,6 @@ def test_the_order_of_a_step(flags: int, action: tuple[int, ...], expected: str)
     assert trace(batch, OWN) == expected
 
 
-def test_what_changes_on_a_turn_is_settled_at_the_next_point() -> None:
-    shut = [(Op.BECOME, constant(2), constant(LOCKED))]
-    frame = FrameSpec(1, ([],), then=({-1: shut},))
-    batch = traced(frames=(frame,))
-    step(batch)
-    assert trace(batch, OWN) == "1756", "a change in `then` of the last NPC waits for the rules"
-    batch.state.registers[0, OWN : OWN + 3] = 0
-    step(batch)
-    assert trace(batch, OWN) == "17", "to become what it is is no change"
-
-
 @pytest.mark.parametrize(
     ("rule", "expected"),
     [
@@ -120,15 +109,6 @@ def test_what_counts_as_a_change(rule: Instruction, expected: str) -> None:
     batch.state.registers[0, OWN : OWN + 3] = 0
     step(batch)
     assert trace(batch, OWN) == "", "once"
-
-
-def test_npcs_that_toggle_change_things() -> None:
-    frame = FrameSpec(1, ([(Op.BODY, constant(Body.TOGGLE))],))
-    room = {"at": ((3, 3), (1, 2), (0, 2)), "facing": (0, 2)}
-    batch = traced(frames=(frame,), before=(), rules=(), **room)
-    step(batch)
-    assert trace(batch, OWN) == "56"
-    assert batch.state.registers[0, entity_register(2, Field.STATUS)] == OPEN
 
 
 def test_toggling_what_ignores_it_is_no_change() -> None:
@@ -179,39 +159,10 @@ LINKED = {
     ],
     "reset": [(Op.LOAD, entity_register(2, Field.STATUS), constant(LOCKED))],
 }
-ALSO_LOCKED = [
-    # The first door is locked for good as soon as the second is not.
-    (Op.IF_NE, entity_register(2, Field.STATUS), constant(LOCKED), 1),
-    (Op.BECOME, constant(1), constant(LOCKED)),
-]
 
 
 def statuses(batch: Batch) -> list[int]:
     return [int(batch.state.registers[0, entity_register(n, Field.STATUS)]) for n in (1, 2)]
-
-
-def test_a_status_unlocks_while_it_lasts() -> None:
-    batch = batch_of(Assembly(**LINKED).program())  # type: ignore[arg-type]
-    assert statuses(batch) == [CLOSED, LOCKED]
-    step(batch, TOGGLE)
-    assert statuses(batch) == [OPEN, CLOSED]
-
-
-def test_an_early_picture_shows_links_but_not_what_follows_from_conditions() -> None:
-    at = ((1, 1), (0, 1), (1, 0))
-    late = batch_of(Assembly(**{**LINKED, "at": at, "settle": ALSO_LOCKED}).program())  # type: ignore[arg-type]
-    early = batch_of(Assembly(**{**LINKED, "at": at, "settle": ALSO_LOCKED, "flags": EARLY}).program())  # type: ignore[arg-type]
-    pictures = []
-    for batch in (late, early):
-        step(batch, TOGGLE)
-        assert statuses(batch) == [LOCKED, CLOSED]
-        image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
-        pictures.append([image[3, 5].tolist(), image[4, 6].tolist()])
-    assert pictures[0] == [[4, 0, LOCKED, 0], [4, 0, CLOSED, 0]]
-    assert pictures[1] == [[4, 0, OPEN, 0], [4, 0, CLOSED, 0]]
-    step(early)
-    image = early.state.image.view(np.uint8).reshape(7, 7, 4)
-    assert image[3, 5].tolist() == [4, 0, LOCKED, 0], "the next one shows it"
 
 
 def test_an_early_picture_is_taken_before_anything_is_said() -> None:

@@ -12,21 +12,15 @@ from socialai_dsl.program import Body, Field, Flag, Op, Register
 from tests.assembly import (
     CLOSED,
     HIDDEN,
-    LOCKED,
     OPEN,
     Assembly,
     FrameSpec,
     batch_of,
     constant,
     entity_register,
+    play,
     temporary,
 )
-
-
-def play(batch: Batch, *actions: tuple[int, ...]) -> None:
-    for action in actions:
-        batch.ports.actions[:] = action
-        batch.step(Task.STEP_ONLY)
 
 
 def body(action: Body) -> tuple[int, ...]:
@@ -40,56 +34,6 @@ def entity(batch: Batch, number: int, *fields: Field) -> list[int]:
 POSE = (Field.X, Field.Y, Field.DIR)
 
 
-def test_the_agent_turns_and_walks() -> None:
-    batch = batch_of(Assembly(at=((2, 2),)).program())
-    play(batch, body(Body.RIGHT))
-    assert entity(batch, 0, *POSE) == [2, 2, 1]
-    play(batch, body(Body.LEFT), body(Body.LEFT))
-    assert entity(batch, 0, *POSE) == [2, 2, 3]
-    play(batch, body(Body.FORWARD))
-    assert entity(batch, 0, *POSE) == [2, 1, 3]
-    play(batch, body(Body.FORWARD), body(Body.PICKUP), body(Body.DROP), body(Body.DONE))
-    assert entity(batch, 0, *POSE) == [2, 1, 3], "a wall stops it, and the rest does nothing"
-    assert entity(batch, 0, Field.LAST) == [Body.DONE]
-    assert batch.state.registers[0, Register.ACTION] == Body.DONE
-
-
-@pytest.mark.parametrize(("flags", "x"), [(0, 2), (HIDDEN, 3)])
-def test_only_shown_npcs_block_the_agent(flags: int, x: int) -> None:
-    batch = batch_of(Assembly(at=((2, 2), (3, 2)), npcs=1, flags=flags).program())
-    play(batch, body(Body.FORWARD))
-    assert entity(batch, 0, Field.X) == [x]
-
-
-def test_toggling_things() -> None:
-    batch = batch_of(Assembly(at=((1, 2), (0, 2)), objects=("door",), facing=(2,)).program())
-    for status in (OPEN, CLOSED, OPEN):
-        play(batch, body(Body.TOGGLE))
-        assert entity(batch, 1, Field.STATUS) == [status]
-        assert batch.state.registers[0, Register.POKED] == 1
-    play(batch, body(Body.FORWARD), body(Body.FORWARD))
-    assert entity(batch, 0, *POSE) == [0, 2, 2], "through the door, and not off the canvas"
-    assert batch.state.registers[0, Register.POKED] == -1
-
-
-def test_a_locked_door_stays_locked() -> None:
-    locked = [(Op.LOAD, entity_register(1, Field.STATUS), constant(LOCKED))]
-    batch = batch_of(Assembly(at=((1, 2), (0, 2)), objects=("door",), facing=(2,), reset=locked).program())
-    play(batch, body(Body.TOGGLE))
-    assert entity(batch, 1, Field.STATUS) == [LOCKED]
-    assert batch.state.registers[0, Register.POKED] == 1
-
-
-@pytest.mark.parametrize("flags", [0, HIDDEN])
-def test_poking_an_npc_hidden_or_not(flags: int) -> None:
-    batch = batch_of(Assembly(at=((2, 2), (3, 2)), npcs=1, flags=flags).program())
-    play(batch, body(Body.TOGGLE))
-    assert batch.state.registers[0, Register.POKED] == 1
-    play(batch, body(Body.NONE))
-    assert batch.state.registers[0, Register.POKED] == -1
-    assert entity(batch, 1, Field.POKED) == [1], "for the rest of the episode"
-
-
 def npc_program(activity: list[tuple[int, ...]], **room: object) -> Batch:
     frames = (FrameSpec(1, (activity,)),)
     return batch_of(Assembly(npcs=1, frames=frames, **room).program())  # type: ignore[arg-type]
@@ -98,141 +42,9 @@ def npc_program(activity: list[tuple[int, ...]], **room: object) -> Batch:
 FORWARD = [(Op.BODY, constant(Body.FORWARD))]
 
 
-@pytest.mark.parametrize(
-    ("room", "x"),
-    [
-        ({"at": ((1, 1), (2, 2))}, 3),
-        ({"at": ((3, 2), (2, 2))}, 2),
-        ({"at": ((3, 2), (2, 2)), "flags": HIDDEN}, 2),
-        ({"at": ((1, 1), (2, 2), (3, 2)), "objects": ("door",)}, 2),
-        ({"at": ((1, 1), (2, 2), (3, 2)), "objects": ("lava",)}, 3),
-        ({"at": ((1, 1), (2, 2), (3, 2)), "objects": ("lava",), "deadly": True}, 2),
-    ],
-)
-def test_npcs_never_enter_what_is_taken_solid_or_deadly(room: dict[str, object], x: int) -> None:
-    batch = npc_program(FORWARD, **room)
-    play(batch, body(Body.NONE))
-    assert entity(batch, 1, Field.X, Field.LAST) == [x, Body.FORWARD]
-
-
-def test_the_board_follows_the_npc() -> None:
-    batch = npc_program(FORWARD, at=((1, 1), (1, 2)))
-    for x in (2, 3, 3):
-        play(batch, body(Body.NONE))
-        cells = batch.state.boards[0, :42].reshape(7, 6) & 0xFF
-        assert np.argwhere(cells == 11).tolist() == [[2, x]]
-
-
-def test_npcs_toggle_things() -> None:
-    batch = npc_program([(Op.BODY, constant(Body.TOGGLE))], at=((1, 1), (1, 2), (2, 2)), objects=("door",))
-    play(batch, body(Body.NONE))
-    assert entity(batch, 2, Field.STATUS) == [OPEN]
-    assert batch.state.registers[0, Register.POKED] == -1, "that is for what the agent uses"
-
-
 def noting(own: int, digit: int, base: int = 10) -> list[tuple[int, ...]]:
     """Code that appends a digit to a register."""
     return [(Op.MUL, own, own, constant(base)), (Op.ADD, own, own, constant(digit))]
-
-
-def test_first_activity_then_and_clock() -> None:
-    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
-    room = Assembly(
-        at=((1, 1), (2, 2)),
-        npcs=1,
-        settle=noting(own, 4, 5),
-        flags=int(Flag.SETTLE_ALWAYS),
-        frames=(
-            FrameSpec(
-                1,
-                ([*noting(own, 2, 5), (Op.BODY, constant(Body.RIGHT))],),
-                first=({-1: noting(own, 1, 5)},),
-                then=({-1: noting(own, 3, 5)},),
-            ),
-        ),
-    )
-    clock = room.state_register(0) + 1
-    batch = batch_of(room.program())
-    batch.state.registers[0, own] = 0
-    play(batch, body(Body.NONE))
-    # Settled: after the agent, after the NPC's body, at the end.
-    assert batch.state.registers[0, own] == int("412434", 5)
-    assert batch.state.registers[0, clock] == 1
-    assert entity(batch, 1, Field.DIR) == [1]
-
-
-def test_goto_in_first_runs_the_new_states_activity_and_restarts_the_clock() -> None:
-    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
-    room = Assembly(
-        at=((1, 1), (2, 2)),
-        npcs=1,
-        frames=(
-            FrameSpec(
-                1,
-                ([(Op.BODY, constant(Body.LEFT))], [(Op.BODY, constant(Body.RIGHT))]),
-                first=({-1: [(Op.IF_EQ, Register.T, constant(3), 1), (Op.GOTO, 0, 1)]},),
-                then=({-1: noting(own, 1)}, {-1: noting(own, 2)}),
-            ),
-        ),
-    )
-    state = room.state_register(0)
-    batch = batch_of(room.program())
-    play(batch, *[body(Body.NONE)] * 2)
-    assert batch.state.registers[0, [state, state + 1, own]].tolist() == [0, 2, 11]
-    play(batch, body(Body.NONE))
-    assert batch.state.registers[0, [state, state + 1, own]].tolist() == [1, 1, 112]
-    assert entity(batch, 1, Field.DIR) == [3], "left, left, right"
-
-
-def test_a_first_rule_with_its_own_action_takes_the_whole_turn() -> None:
-    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
-    frame = FrameSpec(
-        1,
-        ([(Op.BODY, constant(Body.LEFT))],),
-        first=({-1: [(Op.BODY, constant(Body.RIGHT))]},),
-        then=({-1: noting(own, 1)},),
-    )
-    room = Assembly(at=((1, 1), (2, 2)), npcs=1, frames=(frame,))
-    batch = batch_of(room.program())
-    play(batch, body(Body.NONE))
-    assert entity(batch, 1, Field.DIR) == [1]
-    assert batch.state.registers[0, [own, room.state_register(0) + 1]].tolist() == [0, 1]
-
-
-def test_npcs_act_in_order_and_see_what_those_before_did() -> None:
-    frames = (FrameSpec(1, (FORWARD,)), FrameSpec(2, (FORWARD,)))
-    follow = batch_of(Assembly(at=((1, 1), (2, 2), (1, 2)), npcs=2, frames=frames).program())
-    play(follow, body(Body.NONE))
-    assert [entity(follow, n, Field.X)[0] for n in (1, 2)] == [3, 2]
-    blocked = batch_of(Assembly(at=((1, 1), (1, 2), (2, 2)), npcs=2, frames=frames).program())
-    play(blocked, body(Body.NONE))
-    assert [entity(blocked, n, Field.X)[0] for n in (1, 2)] == [1, 3]
-
-
-def test_who_left_the_room_does_nothing() -> None:
-    batch = npc_program(FORWARD, at=((1, 1), (2, 2)), reset=[(Op.VANISH, constant(1))])
-    play(batch, body(Body.NONE))
-    assert entity(batch, 1, Field.X) == [2]
-    play(batch, body(Body.RIGHT), body(Body.FORWARD), body(Body.LEFT), body(Body.FORWARD), body(Body.FORWARD))
-    assert entity(batch, 0, *POSE) == [3, 2, 0], "it blocks nobody"
-
-
-def test_who_vanishes_before_it_moves_does_nothing_more_but_what_it_said_is_heard() -> None:
-    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
-    frame = FrameSpec(
-        1,
-        ([*noting(own, 1), *FORWARD],),
-        first=({-1: [(Op.SAY, constant(1), constant(0)), (Op.VANISH, constant(1))]},),
-        then=({-1: noting(own, 2)},),
-    )
-    room = Assembly(at=((1, 1), (2, 2)), npcs=1, frames=(frame,), lines=(("bye", (2,), 1),), earshot=(0, 9))
-    batch = batch_of(room.program())
-    play(batch, body(Body.NONE))
-    assert entity(batch, 1, Field.X, Field.GONE, Field.LAST) == [2, 1, Body.NONE]
-    assert batch.state.registers[0, [own, room.state_register(0) + 1]].tolist() == [0, 0]
-    assert batch.state.registers[0, Register.HEARD] == 1
-    play(batch, body(Body.NONE))
-    assert batch.state.registers[0, Register.HEARD] == 0
 
 
 def test_two_frames_of_one_npc_share_a_turn() -> None:
@@ -384,30 +196,6 @@ def test_what_is_perceived_comes_before_anything_else_of_a_turn_even_of_one_with
     batch = batch_of(Assembly(at=((1, 1), (2, 2)), npcs=1, frames=frames).program())
     play(batch, body(Body.NONE))
     assert batch.state.registers[0, own] == 1234
-
-
-def test_the_rest_of_a_rule_of_first_comes_after_the_move_and_the_clock() -> None:
-    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
-    frame = FrameSpec(
-        1,
-        ([(Op.BODY, constant(Body.LEFT))], []),
-        first=({-1: [(Op.IF_EQ, Register.T, constant(2), 1), (Op.BODY, constant(Body.RIGHT))]},),
-        then=({-1: noting(own, 1)},),
-        deferred=[
-            *noting(own, 2),
-            (Op.LOAD, own + 1, entity_register(1, Field.DIR)),
-            (Op.SAY, constant(1), constant(0)),
-            (Op.GOTO, 0, 1),
-        ],
-    )
-    room = Assembly(at=((1, 1), (2, 2)), npcs=1, frames=(frame,), lines=(("so", (2,), 1),), earshot=(0, 9))
-    batch = batch_of(room.program())
-    state = room.state_register(0)
-    play(batch, body(Body.NONE))
-    assert batch.state.registers[0, [own, state, state + 1]].tolist() == [1, 0, 1]
-    play(batch, body(Body.NONE))
-    assert batch.state.registers[0, [own, own + 1, state, state + 1]].tolist() == [12, 0, 1, 0]
-    assert batch.state.registers[0, Register.HEARD] == 1
 
 
 def test_the_scripted_agent_defers_too() -> None:
