@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import socialai_dsl as sd
+from socialai_dsl.envs import ScenarioVectorEnv
 from tests.scenarios.playing import Episode, check_shares, evenly, made, rooms
 
 SUITES = ["social_env+as_coded", "social_env"]
@@ -29,6 +31,15 @@ COINS: dict[str, Any] = {
 
 def played(suite: str, member: str, **layout: Any) -> Episode:
     return Episode(suite, {"member": member, **layout})
+
+
+def after_each_pair(suite: str, **layout: Any) -> tuple[list[tuple[int, int]], ScenarioVectorEnv, Any]:
+    """Every pair of a suite, environments in each of which one was said, and what that step gave."""
+    program = made(suite).program
+    pairs = list(product(range(len(program.templates)), range(len(program.nouns))))
+    envs = sd.make_vec(program, len(pairs), autoreset_mode="Disabled")
+    envs.reset(seed=0, options={"layout": layout})
+    return pairs, envs, envs.step(np.array([(7, 1, *pair) for pair in pairs]))
 
 
 def segment(member: str, lengths: dict[str, int]) -> range:
@@ -86,12 +97,9 @@ class TestSentences:
 
     @pytest.mark.parametrize("member", MEMBERS)
     def test_as_coded_only_the_member_s_own_pairs_are_heard(self, member: str) -> None:
-        live = set()
-        for template, noun in product(range(15), range(45)):
-            episode = played(CODED, member)
-            episode.env.step(np.array([7, 1, template, noun]))
-            if episode.now()["last"]["said"] is not None:
-                live.add((template, noun))
+        pairs, envs, _ = after_each_pair(CODED, member=member)
+        assert len(pairs) == 15 * 45
+        live = {pair for row, pair in enumerate(pairs) if envs.describe(row)["last"]["said"] is not None}
         assert live == set(product(segment(member, TEMPLATES), segment(member, NOUNS)))
         assert len(live) == LIVE[member]
 
@@ -99,18 +107,17 @@ class TestSentences:
     def test_as_in_the_paper_the_pair_must_be_one_of_the_member(self, member: str) -> None:
         program, own = made(PAPER).program, made(member).program
         sentences = {t.replace("<noun>", n) for t, n in product(own.templates, own.nouns)}
-        for t, n in product(range(7), range(26)):
-            episode = played(PAPER, member)
-            episode.env.step(np.array([7, 1, t, n]))
+        pairs, envs, _ = after_each_pair(PAPER, member=member)
+        assert len(pairs) == 7 * 26
+        for row, (t, n) in enumerate(pairs):
             sentence = program.templates[t].replace("<noun>", program.nouns[n])
-            assert episode.now()["last"]["said"] == (sentence if sentence in sentences else None)
+            assert envs.describe(row)["last"]["said"] == (sentence if sentence in sentences else None)
 
     def test_as_coded_a_foreign_pair_is_silence(self) -> None:
         # Any utterance ends CoinThief, and these say the right number in vain.
-        for template, noun in product(range(15), range(45)):
-            episode = Episode(CODED, COINS)
-            _, reward, terminated, _, _ = episode.env.step(np.array([7, 1, template, noun]))
-            assert terminated == (template == 2 and 2 <= noun <= 8)
+        pairs, _, (_, rewards, terminated, *_) = after_each_pair(CODED, **COINS)
+        for (template, noun), reward, ended in zip(pairs, rewards, terminated, strict=True):
+            assert ended == (template == 2 and 2 <= noun <= 8)
             assert (reward > 0) == ((template, noun) == (2, 6))
 
     def test_as_coded_a_foreign_pair_keeps_a_dance_silent(self) -> None:

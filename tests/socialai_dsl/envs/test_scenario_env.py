@@ -54,87 +54,6 @@ def test_variants_share_vocabulary_and_length() -> None:
     assert shown.vocabulary[:2] == ("<pad>", "<unk>")
 
 
-# --- a dialogue ---------------------------------------------------------------------------------------------------
-
-LAYOUT = {
-    "room": {"width": 6, "height": 7},
-    "agent": {"at": [2, 3], "facing": "left"},
-    "wizard": {"at": [1, 1], "facing": "down", "color": "red"},
-    "honest": {"at": [4, 4], "color": "blue", "name": "John"},
-    "liar": {"at": [1, 5], "name": "Jack"},
-    "doors": [{"at": [2, 0], "color": "green"}, {"at": [3, 6], "color": "red"}],
-    "let": {"exit": "doors[0]"},
-}
-
-
-def play(env: ScenarioEnv, *plan: tuple[Any, Any]) -> list[tuple[Any, ...]]:
-    return [env.step(env.encode_action(action)) for action in plan]
-
-
-def test_the_wizard_names_the_guide_and_the_guide_the_door() -> None:
-    env = sd.make("talkitout")
-    env.reset(seed=0, options={"layout": LAYOUT})
-    steps = play(
-        env,
-        ("left", None),  # faces down now
-        ("left", None),  # right
-        ("forward", None),
-        ("right", "How are you"),
-        ("forward", "How are you"),  # at (3, 4): the honest guide is at (4, 4)
-        (None, "How are you"),
-        (None, "Where is the exit"),
-        (None, "Open sesame"),  # no door is near
-    )
-    heard = [info["utterance"] for *_, info in steps]
-    assert heard == ["NA", "NA", "NA", "NA", "John: I am fine.", "NA", "John: Go to the green door.", "NA"]
-    assert steps[-1][4]["history"] == "John: I am fine.\nJohn: Go to the green door."
-    words = [env.program.vocabulary[token] for token in steps[-1][0]["tokens"] if token]
-    assert " ".join(words) == "john i am fine john go to the green door"
-
-
-def test_the_right_door_opens_to_the_right_words() -> None:
-    env = sd.make("talkitout")
-    env.reset(seed=0, options={"layout": {**LAYOUT, "agent": {"at": [2, 1], "facing": "up"}}})
-    ((_, reward, terminated, truncated, info),) = play(env, (None, "Open sesame"))
-    assert (terminated, truncated, info["success"]) == (True, False, True)
-    assert reward == pytest.approx(1 - 0.9 * 1 / 100)
-    assert info["outcome"].startswith("success@")
-    with pytest.raises(ValueError, match="outside of an episode"):
-        env.step(env.action_space.sample())
-
-
-def test_the_wrong_door_and_toggle_and_done_fail() -> None:
-    env = sd.make("talkitout")
-    for start, action in (
-        ([3, 5], (None, "Open sesame")),
-        ([2, 3], ("toggle", None)),
-        ([2, 3], ("done", None)),
-    ):
-        env.reset(seed=0, options={"layout": {**LAYOUT, "agent": {"at": start}}})
-        ((_, reward, terminated, _, info),) = play(env, action)
-        assert (reward, terminated, info["success"]) == (0.0, True, False)
-
-
-def test_hidden_npcs_are_silent_and_can_be_walked_through() -> None:
-    env = sd.make("talkitout+unsocial")
-    env.reset(seed=0, options={"layout": {**LAYOUT, "agent": {"at": [3, 4], "facing": "right"}}})
-    steps = play(env, (None, "How are you"), ("forward", None))
-    assert [info["utterance"] for *_, info in steps] == ["NA", "NA"]
-    assert env.describe()["agent"]["at"] == env.describe()["honest"]["at"] == [4, 4]
-    assert env.describe()["honest"]["state"] == "acquainted"
-
-
-def test_the_picture_has_the_codes_of_the_paper() -> None:
-    env = sd.make("talkitout")
-    observation, _ = env.reset(
-        seed=0, options={"layout": {**LAYOUT, "agent": {"at": [3, 4], "facing": "right"}}}
-    )
-    image = observation["image"]
-    assert image[3, 6].tolist() == [1, 0, 0, 0]  # the agent's own cell
-    assert image[3, 5].tolist() == [11, 2, 1, 1]  # a blue guide, facing down
-    assert image[3, 4].tolist()[:2] in ([2, 5], [4, image[3, 4, 1]])  # the right wall, or a door in it
-
-
 # --- actions in words ---------------------------------------------------------------------------------------------
 
 
@@ -181,6 +100,16 @@ def test_actions_outside_the_space_are_refused(action: Any) -> None:
 
 # --- layouts ------------------------------------------------------------------------------------------------------
 
+LAYOUT = {
+    "room": {"width": 6, "height": 7},
+    "agent": {"at": [2, 3], "facing": "left"},
+    "wizard": {"at": [1, 1], "facing": "down", "color": "red"},
+    "honest": {"at": [4, 4], "color": "blue", "name": "John"},
+    "liar": {"at": [1, 5], "name": "Jack"},
+    "doors": [{"at": [2, 0], "color": "green"}, {"at": [3, 6], "color": "red"}],
+    "let": {"exit": "doors[0]"},
+}
+
 
 def test_a_layout_is_what_the_room_becomes_and_the_rest_is_drawn_around_it() -> None:
     env = sd.make("talkitout")
@@ -202,22 +131,6 @@ def test_a_layout_is_what_the_room_becomes_and_the_rest_is_drawn_around_it() -> 
         assert len(set(cells)) == 4
         drawn.add((state["doors"][2]["color"], tuple(state["doors"][2]["at"])))
     assert len(drawn) > 5
-
-
-def test_describe_can_be_put_back_at_any_moment() -> None:
-    rng = np.random.default_rng(0)
-    for name in ("talkitout", "talkitout+unsocial", "talkitout+oracle"):
-        env, other = sd.make(name), sd.make(name)
-        for episode in range(12):
-            env.reset(seed=episode)
-            for _ in range(int(rng.integers(0, 25))):
-                env.step(np.array([rng.integers(3), 1, rng.choice([0, 3]), rng.choice([1, 3])]))
-            state = env.describe()
-            observation, info = other.reset(seed=99 + episode, options={"layout": state})
-            assert other.describe() == state
-            assert info["history"] == "\n".join(state["heard"])
-            assert np.array_equal(observation["image"], env._observation()["image"])
-            assert np.array_equal(observation["tokens"], env._observation()["tokens"])
 
 
 @pytest.mark.parametrize(

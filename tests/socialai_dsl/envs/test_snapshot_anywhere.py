@@ -54,10 +54,11 @@ def test_what_follows_a_snapshot_is_the_same(mode: str, name: str, before: int, 
         envs.step(step)
     saved = envs.snapshot()
     expected = [told(envs, step) for step in actions[before:]]
-    described = [envs.describe(i) for i in range(ENVS)]
+    described, counted = [envs.describe(i) for i in range(ENVS)], envs.counters()
     for target in (other, envs):
         target.reset(seed=1)
         target.restore(saved)
         assert target.snapshot() == saved
         assert [told(target, step) for step in actions[before:]] == expected
         assert [target.describe(i) for i in range(ENVS)] == described
+        assert target.counters() == counted

@@ -129,29 +129,6 @@ def test_buffers_are_private_with_copy_and_the_engines_own_without() -> None:
         assert np.array_equal(first["image"], kept) == copy
 
 
-def test_snapshot_is_exact_in_the_middle_of_episodes() -> None:
-    envs = sd.make_vec("talkitout", 40, autoreset_mode="SameStep")
-    envs.reset(seed=2)
-    plan = actions(envs, 60, seed=1)
-    for step in plan[:25]:
-        envs.step(step)
-    saved = envs.snapshot()
-    assert isinstance(saved, bytes)
-
-    def rest(envs: ScenarioVectorEnv) -> list[Any]:
-        return [
-            [a.tolist() for a in (o["image"], o["tokens"], r, t, u)]
-            for o, r, t, u, _ in map(envs.step, plan[25:])
-        ]
-
-    expected = rest(envs)
-    counted = envs.counters()
-    for target in (envs, sd.make_vec("talkitout", 40, autoreset_mode="SameStep")):
-        target.restore(saved)
-        assert rest(target) == expected
-        assert target.counters() == counted
-
-
 @pytest.mark.parametrize("spoil", ["cut", "flip", "other"])
 def test_a_foreign_snapshot_is_refused(spoil: str) -> None:
     envs = sd.make_vec("talkitout", 2)
