@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -225,6 +225,14 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str | None:
         if best is None or rank < best:
             best = rank
     return best[2] if best else None
+
+
+def suggested(
+    word: str, candidates: Iterable[str], otherwise: str = "", quoted: Callable[[str], str] = str
+) -> str:
+    """`; did you mean x?`, to be put behind a message; what is said `otherwise` where no candidate is near."""
+    near = did_you_mean(word, candidates)
+    return otherwise if near is None else f"; did you mean {quoted(near)}?"
 
 
 @contextmanager

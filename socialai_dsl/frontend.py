@@ -235,6 +235,17 @@ class CheckResult:
         """Whether it cannot be used."""
         return any(d.severity is Severity.ERROR for d in self.diagnostics)
 
+    def read(self) -> ResolvedFile:
+        """The data, if nothing is wrong.
+
+        Raises:
+            ScenarioError: with all findings, if one of them is an error.
+        """
+        if self.has_errors:
+            raise ScenarioError(self.diagnostics, self.sources)
+        assert self.resolved is not None, "internal: nothing was read, and nothing is wrong"
+        return self.resolved
+
 
 def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded:
     """Read and check a scenario or suite.
@@ -247,16 +258,13 @@ def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded
         ScenarioError: with all findings, if one of them is an error.
     """
     result = check(name, texts)
-    if result.has_errors:
-        raise ScenarioError(result.diagnostics, result.sources)
-    loaded = _loaded(result)
+    resolved, loaded = result.read(), _loaded(result)
     if loaded is None:
-        assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
-        kind = result.resolved.kind
+        kind = resolved.kind
         what = "an abstract scenario, which others build on"
         if kind != "scenario":
             what = f"a file of the kind `{kind}`"
-        span = result.resolved.tree.key_span((kind,))
+        span = resolved.tree.key_span((kind,))
         message = f"this is {what}; only a scenario can be run"
         raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
     return loaded
@@ -280,13 +288,11 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(name)
-    if result.has_errors:
-        raise ScenarioError(result.diagnostics, result.sources)
+    resolved = result.read()
     if result.experiment is None:
-        assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
-        kind = result.resolved.kind
+        kind = resolved.kind
         message = f"this is a file of the kind `{kind}`, not an experiment"
-        span = result.resolved.tree.key_span((kind,))
+        span = resolved.tree.key_span((kind,))
         raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
     return result.experiment
 
@@ -384,8 +390,7 @@ def _check_played(
             if loaded is not None:
                 played[written] = loaded
                 continue
-            assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
-            kind = result.resolved.kind
+            kind = result.read().kind
             what = "an abstract scenario" if kind == "scenario" else f"a file of the kind `{kind}`"
             bag.error("S108", f"`{written}` is {what}; only a scenario or a suite can be run", span)
             continue

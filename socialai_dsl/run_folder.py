@@ -7,18 +7,17 @@ import time
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from filelock import FileLock, Timeout
+from pydantic import ValidationError
 
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.folder import EPISODES as EPISODES
 from socialai_dsl.experiments.folder import REPLAY as REPLAY
-
-if TYPE_CHECKING:
-    from trainer.config import RunConfig
+from trainer.config import RunConfig
 
 RESULT: Final = "result.json"
 SETTINGS: Final = "config.json"
@@ -107,7 +106,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def read_config(folder: Path) -> "RunConfig":
+def read_config(folder: Path) -> RunConfig:
     """The configuration of a run's folder.
 
     Raises:
@@ -115,10 +114,6 @@ def read_config(folder: Path) -> "RunConfig":
     """
     if not (folder / SETTINGS).is_file():
         raise UsageError(f"{folder} is not a run's folder, it has no {SETTINGS}")
-    from pydantic import ValidationError
-
-    from trainer.config import RunConfig
-
     try:
         # As JSON, because strict validation takes no lists for tuples from Python.
         return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS)))

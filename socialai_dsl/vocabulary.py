@@ -125,17 +125,14 @@ class Sentences:
         """
         used = []
         for place in range(len(templates)):
-            found = [False] * len(slots)
-            for own, template_map in parts:
-                if template_map[place] < 0:
-                    continue
-                names = {
-                    slot.name
-                    for slot, is_used in zip(own.slots, own.used[template_map[place]], strict=True)
-                    if is_used
-                }
-                found = [known or slot.name in names for known, slot in zip(found, slots, strict=True)]
-            used.append(tuple(found))
+            names = {
+                slot.name
+                for own, template_map in parts
+                if template_map[place] >= 0
+                for slot, is_used in zip(own.slots, own.used[template_map[place]], strict=True)
+                if is_used
+            }
+            used.append(tuple(slot.name in names for slot in slots))
         return cls(tuple(templates), tuple(slots), tuple(used))
 
     def text(self, template: int, choices: Sequence[int]) -> str:

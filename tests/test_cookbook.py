@@ -8,7 +8,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.properties import by_default, check_property
+from socialai_dsl.analysis.properties import Trial, by_default
 from socialai_dsl.analysis.reports import Verdict
 from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
@@ -98,7 +98,7 @@ def test_success_is_knowable_unless_a_recipe_says_otherwise(path: Path) -> None:
     (plan,) = (plan for plan in by_default(loaded, place) if plan.kind == "knowable")
     assert plan.expected is (path.stem != "hidden_information_silent")
     scripted = loaded if any(frame.entity == 0 for frame in loaded.checked.frames) else None
-    report = check_property(loaded, plan, Effort(2), scripted)
+    report = Trial(loaded, Effort(2), scripted).check(plan, Effort(2))
     assert report.verdict is Verdict.HOLDS, report.said
 
 

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.redrawn import redrawn, sites_of
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import Start, start_in
+from socialai_dsl.analysis.rooms import wins_of
 from socialai_dsl.analysis.search import Search, SearchVerdict
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
 
 LEARNT_FROM: Final = 32
@@ -132,7 +132,7 @@ class _Twins:
         self._program, self._seed = program, seed
         canvas = program.header(Header.CANVAS_WIDTH) * program.header(Header.CANVAS_HEIGHT)
         self._cells = slice(0, canvas)
-        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
+        self._wins = wins_of(program)
         showing = self._showing()
         self._hidden = {site for site, shows in zip(sites_of(program), showing, strict=True) if not shows}
         self._tables: list[Table] = []
@@ -150,7 +150,7 @@ class _Twins:
             looks_here = self._looks(table)
             looks = looks_here[0] if looks is None else looks
             self._drawn += [
-                _Twin(number, k, start_in(table, k))
+                _Twin(number, k, table.start(k))
                 for k in np.flatnonzero((looks_here == looks).all(axis=1)).tolist()
             ]
             if len(self._drawn) >= wanted:
@@ -181,7 +181,7 @@ class _Twins:
         if number == len(self._tables):
             first = number * _BLOCK
             copies = [redrawn(self._program, self._hidden, first + k) for k in range(_BLOCK)]
-            self._tables.append(Table(copies, _BLOCK, 1))
+            self._tables.append(Table(copies, _BLOCK))
         return self._tables[number]
 
     def _looks(self, table: Table) -> NDArray[np.int64]:
@@ -194,7 +194,7 @@ class _Twins:
         """Which sites show whenever they change anything, (sites,)."""
         sites = self._program.header(Header.SITES)
         copies = [self._program, *(redrawn(self._program, [one], 1) for one in sites_of(self._program))]
-        table = Table(copies, len(copies), 1)
+        table = Table(copies, len(copies))
         relevant = Relevance.of(self._program).registers
         shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
         for room in range(_ROOMS_PER_SITE):

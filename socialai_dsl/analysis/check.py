@@ -1,7 +1,8 @@
 """Tries what a scenario claims, whether it can be known, and whether everything in it can happen."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.analysis.coverage import coverage
@@ -12,13 +13,23 @@ from socialai_dsl.analysis.scenario_report import ScenarioReport
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import load
+from socialai_dsl.source import Source
 
 Say = Callable[[str], None]
 """Takes a line of the report."""
 
 
+Texts = Mapping[Path, Source] | None
+"""Contents that stand for those of files, as `load` takes them."""
+
+
 def check_scenario(
-    loaded: LoadedScenario, called: str, effort: Effort, deep: bool = False, say: Say | None = None
+    loaded: LoadedScenario,
+    called: str,
+    effort: Effort,
+    deep: bool = False,
+    say: Say | None = None,
+    texts: Texts = None,
 ) -> ScenarioReport:
     """Try what a scenario claims, whether it can be known, and whether everything in it can happen.
 
@@ -28,6 +39,7 @@ def check_scenario(
         effort: how much to try, and for how long.
         deep: also try what success takes.
         say: takes the lines of the report as they come.
+        texts: those that the scenario was loaded with.
     """
     place = loaded.resolved.tree.key_span(("outcome",))
     report = ScenarioReport(called, effort.rooms, effort.seed, place)
@@ -45,7 +57,7 @@ def check_scenario(
 
     tell()
     try:
-        scripted = _scripted(loaded, called)
+        scripted = _scripted(loaded, called, texts)
         trial = Trial(loaded, effort, scripted)
         plans = by_default(loaded, place)
         for number, plan in enumerate(plans):
@@ -68,21 +80,21 @@ def check_scenario(
     return report
 
 
-def scenarios_of(name: str) -> list[tuple[LoadedScenario, str]]:
+def scenarios_of(name: str, texts: Texts = None) -> list[tuple[LoadedScenario, str]]:
     """The scenario of a name, or the members of a suite, each with its own."""
-    loaded = load(name)
+    loaded = load(name, texts)
     if isinstance(loaded, LoadedSuite):
         return list({member.name: (member, member.name) for member in loaded.members}.values())
     return [(loaded, name)]
 
 
-def _scripted(loaded: LoadedScenario, called: str) -> LoadedScenario | None:
+def _scripted(loaded: LoadedScenario, called: str, texts: Texts) -> LoadedScenario | None:
     """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
     if not unscripted(loaded):
         return loaded
     base, mark, parameters = called.partition("?")
     try:
-        scripted = load(f"{base}+oracle{mark}{parameters}")
+        scripted = load(f"{base}+oracle{mark}{parameters}", texts)
     except ScenarioError as error:
         if any(diagnostic.code not in _UNKNOWN for diagnostic in error.diagnostics):
             raise

@@ -131,7 +131,7 @@ def _has_happened(key: _Key, part: CoverageItem, seen: _Seen) -> bool:
 
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
-    table = Table([program], effort.rooms, 1)
+    table = Table([program], effort.rooms)
     table.reset(effort.seed, None)
     seen.watch(table.state.registers)
     choose = random_actions(program, effort.rooms, effort.seed)
@@ -144,7 +144,7 @@ def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
 
 def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
     """Members and their states have the same names and numbers with a frame for the agent."""
-    table, watching = Table([program], effort.rooms, 1), _Seen(program, seen.names, seen.states)
+    table, watching = Table([program], effort.rooms), _Seen(program, seen.names, seen.states)
     table.reset(effort.seed, None)
     while not table.state.registers[:, Register.ENDED].all():
         table.batch.ports.actions[:] = table.scripted_actions()
@@ -155,13 +155,12 @@ def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
 
 def _search(program: Program, parts: list[tuple[_Key, CoverageItem]], seen: _Seen, effort: Effort) -> bool:
     """Go through all that can be done in room after room; whether nothing was left out."""
-    table = Table([program], effort.rooms, 1)
+    table = Table([program], effort.rooms)
     table.reset(effort.seed, None)
-    search, state = Search(program, (), seen.watch), table.state
+    search = Search(program, (), seen.watch)
 
     def find(row: int) -> bool:
-        start = state.registers[row], state.boards[row], state.keys[row]
-        finding = search.solve(*start, effort.states, effort.clock)
+        finding = search.solve(*table.start(row), effort.states, effort.clock)
         seen.count(search.counters())
         return finding.verdict is SearchVerdict.UNSOLVABLE and finding.exact
 

@@ -2,15 +2,16 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from socialai_dsl.analysis.sheet_text import code, entries, flow, frame, items, rule, table
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.loader.shipped import IDS, base_of, file_of, is_shipped, variants_of
-
-if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
-    from socialai_dsl.schema.scenario import CastMember
+from socialai_dsl.program import Header
+from socialai_dsl.program_suite import ProgramSuite, channels_of
+from socialai_dsl.schema.scenario import CastMember
 
 _GENERATED: Final = "<!-- Written by `make sheets`; change the scenario's file and run it again. -->"
 _MEMBERS_SHOWN: Final = 40
@@ -18,7 +19,7 @@ _FILES: Final = "../../scenarios"
 _DEFAULTS: Final = {"kind": "peer", "place": "anywhere", "facing": "random", "color": "random"}
 
 
-def sheet(name: str, loaded: "Loaded") -> str:
+def sheet(name: str, loaded: Loaded) -> str:
     """The data sheet of any scenario or suite as Markdown, without pictures and measurements.
 
     Args:
@@ -31,7 +32,7 @@ def sheet(name: str, loaded: "Loaded") -> str:
     return _sheet(lines, name, loaded)
 
 
-def page(name: str, loaded: "Loaded", measured: Mapping[str, Any] | None) -> str:
+def page(name: str, loaded: Loaded, measured: Mapping[str, Any] | None) -> str:
     """The sheet of a shipped scenario or suite as a page of the documentation.
 
     Args:
@@ -49,10 +50,8 @@ def page(name: str, loaded: "Loaded", measured: Mapping[str, Any] | None) -> str
 
 
 def _sheet(
-    lines: list[str], name: str, loaded: "Loaded", measured: Mapping[str, Any] | None = None, link: str = ""
+    lines: list[str], name: str, loaded: Loaded, measured: Mapping[str, Any] | None = None, link: str = ""
 ) -> str:
-    from socialai_dsl.checking.loaded import LoadedSuite
-
     data = _data(loaded)
     lines += [*_facts(name, loaded, data, link), ""]
     body = _suite(loaded, bool(link)) if isinstance(loaded, LoadedSuite) else _scenario(loaded, data)
@@ -63,7 +62,7 @@ def _sheet(
     return "\n".join(lines).rstrip() + "\n"
 
 
-def index(rows: Mapping[str, tuple["Loaded", Mapping[str, Any] | None]]) -> str:
+def index(rows: Mapping[str, tuple[Loaded, Mapping[str, Any] | None]]) -> str:
     """The list of all sheets as Markdown: name -> scenario and measurements."""
     cells = []
     for name, (loaded, measured) in rows.items():
@@ -89,7 +88,7 @@ def index(rows: Mapping[str, tuple["Loaded", Mapping[str, Any] | None]]) -> str:
     return "\n".join([*head, *table(columns, cells), *foot]) + "\n"
 
 
-def _data(loaded: "Loaded") -> dict[str, Any]:
+def _data(loaded: Loaded) -> dict[str, Any]:
     data = loaded.resolved.data
     assert isinstance(data, dict), "internal: a file is a mapping"
     return data
@@ -113,11 +112,7 @@ def _reward(slope: int, each_step: int) -> str:
     return f"1 - {slope / 1000:g} t / horizon for a success in step t, else 0{also}"
 
 
-def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any], link: str) -> list[str]:
-    from socialai_dsl.compilation import compile_loaded
-    from socialai_dsl.program import Header
-    from socialai_dsl.program_suite import ProgramSuite, channels_of
-
+def _facts(name: str, loaded: Loaded, data: Mapping[str, Any], link: str) -> list[str]:
     playable = compile_loaded(loaded)
     programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
     slots = playable.sentences.slots
@@ -195,7 +190,7 @@ def _share(figures: Mapping[str, Any] | None) -> str:
 # --- suites
 
 
-def _suite(loaded: "LoadedSuite", linked: bool) -> Iterator[list[str]]:
+def _suite(loaded: LoadedSuite, linked: bool) -> Iterator[list[str]]:
     data = _data(loaded)
     names = loaded.member_names
     plays = "all of them, one after another" if loaded.in_sequence else "one of them"
@@ -219,7 +214,7 @@ def _suite(loaded: "LoadedSuite", linked: bool) -> Iterator[list[str]]:
 # --- scenarios
 
 
-def _scenario(loaded: "LoadedScenario", data: Mapping[str, Any]) -> Iterator[list[str]]:
+def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[str]]:
     if notes := data.get("notes"):
         yield ["## Notes", "", str(notes).strip()]
     grammar = loaded.scenario.grammar
@@ -257,7 +252,7 @@ def _scenario(loaded: "LoadedScenario", data: Mapping[str, Any]) -> Iterator[lis
     yield ["## Outcome", "", "The first that holds ends the episode:", "", *_outcomes(data)]
 
 
-def _cast(loaded: "LoadedScenario", data: Mapping[str, Any]) -> list[str]:
+def _cast(loaded: LoadedScenario, data: Mapping[str, Any]) -> list[str]:
     columns = ("who", "role", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
     rows, drawn = [], []
     for key in data["cast"]:
@@ -276,7 +271,7 @@ def _cast(loaded: "LoadedScenario", data: Mapping[str, Any]) -> list[str]:
     return [*table(columns, rows), *drawn]
 
 
-def _member(key: str, member: "CastMember", agent: bool) -> tuple[str, ...]:
+def _member(key: str, member: CastMember, agent: bool) -> tuple[str, ...]:
     where = f"[{', '.join(map(str, member.at))}]" if member.at else member.place or _DEFAULTS["place"]
     return (
         code(key),
@@ -299,7 +294,7 @@ def _object(name: str, content: Mapping[str, Any]) -> tuple[str, ...]:
     return code(name) + count, str(content["type"]), code(where), code(flow(content.get("color", ""))), more
 
 
-def _frames(loaded: "LoadedScenario", data: Mapping[str, Any]) -> list[str]:
+def _frames(loaded: LoadedScenario, data: Mapping[str, Any]) -> list[str]:
     """The frames of the file, then those of the files that a cast member is drawn from, each once."""
     frames = dict(data.get("frames") or {})
     for member in loaded.scenario.cast.values():

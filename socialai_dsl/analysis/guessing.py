@@ -114,7 +114,7 @@ class Guessing:
         self._actions = np.repeat(self._useful, self._chances.count, axis=0)
         rooms = len(weights)
         self._at_once = max(1, _ROWS // (len(self._actions) * rooms))
-        self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
+        self._table = Table([program], self._at_once * len(self._actions) * rooms)
         self._table.reset(0, None)
         self._alone = Search(program)
         self._solvable: dict[tuple[int, bytes], SearchVerdict] = {}
@@ -155,12 +155,10 @@ class Guessing:
     ) -> _Together:
         """The rooms as they begin."""
         state = self._table.state
-        keys = keys.copy()
-        keys[:, [Key.PROGRAM, Key.POOL]] = state.keys[0, [Key.PROGRAM, Key.POOL]]
         return _Together(
             registers[None, :, : state.registers.shape[1]],
             boards[None, :, : state.boards.shape[1]],
-            keys[None],
+            self._table.own_keys(keys)[None],
             np.ones((1, len(registers)), np.bool_),
             np.zeros(1, np.int64),
         )

@@ -23,11 +23,12 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import Rooms, Start, start_in, wins_of
+from socialai_dsl.analysis.rooms import Rooms, wins_of
 from socialai_dsl.analysis.search import Search, SearchVerdict, marks
+from socialai_dsl.analysis.twins import like_first
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import Program, Register
 
 CHANCE: Final = "chance during the episode"
@@ -88,12 +89,12 @@ class Knowing:
         named = [(site, name) for site, name in names_of_sites(rooms.checked, program).items() if name]
         self._drawn = [name for _, name in named for _ in range(_COPIES)]
         copies = [redrawn(program, [site], salt) for site, _ in named for salt in range(1, _COPIES + 1)]
-        self._table = Table([program, *copies], 1 + len(copies), 1)
+        self._table = Table([program, *copies], 1 + len(copies))
         self._relevance = Relevance.of(program)
         self._chances = marks(1 + _COPIES)[1:] if self._relevance.chance else marks(1)[1:]
         sites = [site for site, _ in named]
         self._script = None if scripted is None else _Script(scripted, sites, self._chances, effort)
-        self._playing = Table([program], max(1, len(copies) + len(self._chances)), 1)
+        self._playing = Table([program], max(1, len(copies) + len(self._chances)))
         self._playing.reset(0, None)
         self._search = Search(program)
         self._pair = Guessing(program, np.ones(2, np.int64))
@@ -145,32 +146,27 @@ class Knowing:
         self._table.reset(self._effort.seed, {"index": np.full(self._table.rows, room)})
         state = self._table.state
         relevant = self._relevance.of_rows(state.registers[:, : self._rooms.start(room)[0].shape[0]])
-        same = np.ones(self._table.rows, np.bool_)
-        for array in (state.image, state.extra, state.tokens):
-            same &= (array == array[0]).reshape(len(array), -1).all(axis=1)
         different = (relevant != relevant[0]).any(axis=1)
         others = [
-            _Other(row, self._drawn[row - 1], start_in(self._table, row))
-            for row in np.flatnonzero(same & different).tolist()
+            _Other(row, self._drawn[row - 1], self._table.start(row))
+            for row in np.flatnonzero(like_first(self._table) & different).tolist()
         ]
         registers, board, key = self._rooms.start(room)
         for row, mark in enumerate(self._chances.tolist(), self._table.rows):
             other = key.copy()
             other[Key.KEY] ^= np.uint64(mark)
-            others.append(_Other(row, CHANCE, (registers, board, other)))
+            others.append(_Other(row, CHANCE, Start(registers, board, other)))
         return others
 
     def _solved(self, others: Sequence[_Other], plan: Plan) -> NDArray[np.bool_]:
         """In which alternatives a plan succeeds as well."""
         state, batch, count = self._playing.state, self._playing.batch, len(others)
         state.registers[:, Register.ENDED] = 1
-        own = state.keys[0, [Key.PROGRAM, Key.POOL]].copy()
         for row, other in enumerate(others):
             registers, board, key = other.start
             state.registers[row] = registers[: state.registers.shape[1]]
             state.boards[row] = board[: state.boards.shape[1]]
-            state.keys[row] = key
-        state.keys[:, [Key.PROGRAM, Key.POOL]] = own
+            state.keys[row] = self._playing.own_keys(key)
         for action in plan:
             batch.ports.actions[:] = action
             batch.step(Task.STEP_ONLY)
@@ -182,7 +178,7 @@ class Knowing:
         """The room and an alternative: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
         registers, board, key = self._rooms.start(room)
         its_registers, its_board, its_key = other.start
-        return (
+        return Start(
             np.stack([registers, its_registers[: len(registers)]]),
             np.stack([board, its_board[: len(board)]]),
             np.stack([key, its_key]),
@@ -210,8 +206,7 @@ def followed(table: Table, program: Program) -> ScriptRun:
     plan: list[NDArray[np.int64]] = []
     while True:
         differs = state.registers[:, Register.ENDED] != state.registers[0, Register.ENDED]
-        for array in (state.image, state.extra, state.tokens):
-            differs |= (array != array[0]).reshape(len(array), -1).any(axis=1)
+        differs |= ~like_first(table)
         looks[differs & (looks < 0)] = step
         if (state.registers[:, Register.ENDED] != 0).all():
             break
@@ -242,7 +237,7 @@ class _Script:
     ) -> None:
         copies = [redrawn(program, [site], salt) for site in sites for salt in range(1, _COPIES + 1)]
         playables = [program, *copies, *[program] * len(chances)]
-        self._table = Table(playables, len(playables), 1)
+        self._table = Table(playables, len(playables))
         self._first_chance, self._chances = 1 + len(copies), chances
         self._program, self._seed = program, effort.seed
 

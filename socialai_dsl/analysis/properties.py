@@ -36,8 +36,8 @@ from socialai_dsl.analysis.twins import (
     Tellers,
     TwinComparison,
     Twins,
-    alike,
     layouts,
+    like_first,
     random_actions,
 )
 from socialai_dsl.checking.loaded import LoadedScenario
@@ -108,13 +108,6 @@ class Trial:
                 return _knowable(self, plan, effort)
 
 
-def check_property(
-    loaded: LoadedScenario, plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None = None
-) -> Report:
-    """Try one property of a scenario; see `Trial`."""
-    return Trial(loaded, effort, scripted).check(plan, effort)
-
-
 def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
     """The properties that are tried of a scenario: what it claims, and that its success is knowable.
 
@@ -132,7 +125,7 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if plan.condition is not None:
         program, goals = _with_goal(trial.loaded, plan), (_HOLDS,)
     findings = list(search_rooms_of(program, goals, effort, plan.text))
-    tally = Evidence.empty()
+    tally = Evidence()
     named = {"agent", *_named(trial, plan)}
     for room, finding in enumerate(findings):
         missing = trial.rooms.missing(room, named)
@@ -173,7 +166,7 @@ def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:
 
 def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     findings = list(trial.successes(effort, plan.text))
-    tally = Evidence.empty()
+    tally = Evidence()
     for room, finding in enumerate(findings):
         if trial.rooms.solved_by_idling[room]:
             tally.void.setdefault(_OF_ITSELF, []).append(room)
@@ -211,13 +204,12 @@ def search_rooms_of(
     program: Program, goals: Sequence[str] | None, effort: Effort, what: str
 ) -> Iterator[Finding]:
     """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
-    table = Table([program], effort.rooms, 1)
+    table = Table([program], effort.rooms)
     table.reset(effort.seed, None)
-    search, state = Search(program, goals), table.state
+    search = Search(program, goals)
 
     def find(row: int) -> Finding:
-        start = state.registers[row], state.boards[row], state.keys[row]
-        return search.solve(*start, effort.states, effort.clock)
+        return search.solve(*table.start(row), effort.states, effort.clock)
 
     return effort.each_room(what, find, _is_decided)
 
@@ -273,7 +265,7 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
     """In which rooms of the effort the agent's own frame succeeds, (rooms,)."""
-    table = Table([program], effort.rooms, 1)
+    table = Table([program], effort.rooms)
     table.reset(effort.seed, None)
     registers = table.state.registers
     while not registers[:, Register.ENDED].all():
@@ -369,7 +361,7 @@ _ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
 
 def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     needing = _Needing(trial, plan, effort)
-    tally, counted, exact = Evidence.empty(), Counter[GuessingVerdict](), True
+    tally, counted, exact = Evidence(), Counter[GuessingVerdict](), True
     found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not GuessingVerdict.UNDECIDED)
     for room, (answer, is_exact) in enumerate(found):
         if isinstance(answer, str):
@@ -397,7 +389,7 @@ class _Needing:
         self._trial, self._plan, self._effort = trial, plan, effort
         silent = compile_loaded(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
         self._search = Search(silent)
-        self._alone = Table([silent], effort.rooms, 1)
+        self._alone = Table([silent], effort.rooms)
         self._alone.reset(effort.seed, None)
         self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
         self._with: dict[int, _Draw] = {}
@@ -436,9 +428,7 @@ class _Needing:
 
     def _alone_in(self, room: int, states: int) -> Finding:
         """Whether a success can be reached without them."""
-        state = self._alone.state
-        start = state.registers[room], state.boards[room], state.keys[room]
-        return self._search.solve(*start, states, self._effort.clock)
+        return self._search.solve(*self._alone.start(room), states, self._effort.clock)
 
     def _with_them(self, room: int, alone: Finding) -> tuple[GuessingVerdict | str, bool]:
         """Nobody succeeds without them; with them?"""
@@ -488,7 +478,7 @@ class _Draw:
     def __init__(self, program: Program, path: str, weighted: Sequence[int]) -> None:
         weights = Counter(weighted)
         self._layouts = layouts(program, path, list(weights))
-        self._table = Table([program], len(weights), 1)
+        self._table = Table([program], len(weights))
         self._program, self._weights = program, list(weights.values())
 
     @cached_property
@@ -510,7 +500,7 @@ class _Draw:
         """How well a room can be solved, whatever its draw."""
         self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
         state = self._table.state
-        if not alike(self._table, slice(None)):
+        if not like_first(self._table).all():
             return Guess(GuessingVerdict.TELLS_APART, 0, True)
         return self._guessing.solve(state.registers, state.boards, state.keys, effort)
 
@@ -519,7 +509,7 @@ class _Draw:
         self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
         state, batch = self._table.state, self._table.batch
         plan: Plan | None = ()
-        if alike(self._table, slice(None)):
+        if like_first(self._table).all():
             few = replace(effort, states=_SEARCHED_STATES)
             plan = self._guessing.first_difference(state.registers, state.boards, state.keys, few)
         if plan is None:
@@ -529,11 +519,11 @@ class _Draw:
             before = state.registers.copy()
             batch.ports.actions[:] = action
             batch.step(Task.STEP_ONLY)
-        for row in range(1, self._table.rows):
-            if not alike(self._table, slice(0, row + 1)):
-                names = names_text(tellers.between(self._table, (0, row), before))
-                return f"it is {names}, after {steps_text(len(plan))}"
-        return None
+        same = like_first(self._table)
+        if same.all():
+            return None
+        names = names_text(tellers.between(self._table, (0, int(same.argmin())), before))
+        return f"it is {names}, after {steps_text(len(plan))}"
 
 
 # --- what can be known ---
@@ -544,7 +534,7 @@ def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     found = list(
         effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Knowability.UNDECIDED)
     )
-    tally = Evidence.empty()
+    tally = Evidence()
     for room, one in enumerate(found):
         why = _NO_SUCCESS if one.known is Knowability.NO_SUCCESS else None
         if trial.rooms.missing(room, ("agent",)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
@@ -49,15 +49,10 @@ class Report:
 class Evidence:
     """The evidence room by room: the numbers of the rooms, and the reasons why some are vacuous."""
 
-    held: list[int]
-    against: list[int]
-    undecided: list[int]
-    void: dict[str, list[int]]
-
-    @classmethod
-    def empty(cls) -> Evidence:
-        """Before any room was tried."""
-        return cls([], [], [], {})
+    held: list[int] = field(default_factory=list)
+    against: list[int] = field(default_factory=list)
+    undecided: list[int] = field(default_factory=list)
+    void: dict[str, list[int]] = field(default_factory=dict)
 
     @property
     def rests(self) -> int:
@@ -108,6 +103,3 @@ def steps_text(count: int | None) -> str:
 def names_text(tellers: Sequence[str]) -> str:
     """The sources of a difference, as `Tellers.between` returns them, in words."""
     return ", ".join(name if name == SOMEBODY else f"`{name}`" for name in tellers) or "the walls"
-
-
-# --- by search ---

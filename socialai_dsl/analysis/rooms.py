@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from functools import cached_property
 
 import numpy as np
@@ -11,19 +11,10 @@ from numpy.typing import NDArray
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
 from socialai_dsl.semantics.free_cells import asks_about_cells
 from socialai_dsl.semantics.plans import CheckedScenario, Placing
-
-Start = tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]
-"""Registers, board and key of a room at its start."""
-
-
-def start_in(table: Table, row: int) -> Start:
-    """How a row of a table begins, copied while it stands there."""
-    state = table.state
-    return state.registers[row].copy(), state.boards[row].copy(), state.keys[row].copy()
 
 
 class Rooms:
@@ -37,18 +28,17 @@ class Rooms:
     def __init__(self, checked: CheckedScenario, program: Program, effort: Effort) -> None:
         self.checked, self.program = checked, program
         self._effort = effort
-        self._table = Table([program], effort.rooms, 1)
+        self._table = Table([program], effort.rooms)
         self._table.reset(effort.seed, None)
         state = self._table.state
         self._registers, self._boards = state.registers.copy(), state.boards.copy()
         self._keys = state.keys.copy()
         self._search = Search(program)
         self._findings: dict[int, Finding] = {}
-        self._idle: NDArray[np.bool_] | None = None
 
     def start(self, room: int) -> Start:
         """How a room begins."""
-        return self._registers[room], self._boards[room], self._keys[room]
+        return Start(self._registers[room], self._boards[room], self._keys[room])
 
     def success(self, room: int, effort: Effort) -> Finding:
         """A shortest success in a room, with luck."""
@@ -61,13 +51,6 @@ class Rooms:
     def missing(self, room: int, names: Collection[str]) -> list[str]:
         """Those of these members that are absent from a room although they were placed."""
         return [name for name in self._unasked if name in names and self._gone(room, self._unasked[name])]
-
-    @property
-    def members(self) -> Sequence[str]:
-        """The members of the cast that are to be in every room, the agent among them."""
-        return [
-            name for name, number in self._unasked.items() if self.checked.entities[number].role != "object"
-        ]
 
     @cached_property
     def _unasked(self) -> dict[str, int]:
@@ -84,16 +67,14 @@ class Rooms:
     def _gone(self, room: int, number: int) -> bool:
         return bool(self._registers[room, FIRST_ENTITY + ENTITY_FIELDS * number + Field.GONE])
 
-    @property
+    @cached_property
     def solved_by_idling(self) -> NDArray[np.bool_]:
         """In which rooms a success comes of itself, while the agent does nothing, (rooms,)."""
-        if self._idle is None:
-            registers = self._table.state.registers
-            while not registers[:, Register.ENDED].all():
-                self._table.batch.ports.actions[:] = idle(self.program)
-                self._table.batch.step(Task.STEP_ONLY)
-            self._idle = wins_of(self.program)[registers[:, Register.OUTCOME]]
-        return self._idle
+        registers = self._table.state.registers
+        while not registers[:, Register.ENDED].all():
+            self._table.batch.ports.actions[:] = idle(self.program)
+            self._table.batch.step(Task.STEP_ONLY)
+        return wins_of(self.program)[registers[:, Register.OUTCOME]]
 
 
 def name_of(checked: CheckedScenario, number: int) -> str:

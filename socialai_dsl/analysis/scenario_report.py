@@ -3,17 +3,15 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median_high
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from socialai_dsl.analysis.alone import Alone
+from socialai_dsl.analysis.coverage import Coverage
+from socialai_dsl.analysis.depth import Depth
+from socialai_dsl.analysis.reports import Report
 from socialai_dsl.diagnostics import Diagnostic, Severity
-
-if TYPE_CHECKING:
-    from socialai_dsl.analysis.alone import Alone
-    from socialai_dsl.analysis.coverage import Coverage
-    from socialai_dsl.analysis.depth import Depth
-    from socialai_dsl.analysis.reports import Report
-    from socialai_dsl.semantics.plans import PropertyPlan
-    from socialai_dsl.source import Span
+from socialai_dsl.semantics.plans import PropertyPlan
+from socialai_dsl.source import Span
 
 
 @dataclass
@@ -31,10 +29,10 @@ class ScenarioReport:
     scenario: str
     rooms: int
     seed: int
-    outcomes: "Span | None" = None
-    tried: "tuple[tuple[PropertyPlan, Report], ...]" = ()
-    coverage: "Coverage | None" = None
-    depth: "Depth | None" = None
+    outcomes: Span | None = None
+    tried: tuple[tuple[PropertyPlan, Report], ...] = ()
+    coverage: Coverage | None = None
+    depth: Depth | None = None
     complete: bool = False
     interrupted: bool = False
 
@@ -134,7 +132,7 @@ class ScenarioReport:
         }
 
 
-def _coverage(found: "Coverage") -> Iterator[str]:
+def _coverage(found: Coverage) -> Iterator[str]:
     happened = found.parts - len(found.missing)
     yield f"  {happened} of {found.parts} states, steps, rules and outcomes happen in some room"
     why = "in none of these rooms" if found.proven else "in no room, as far as they were searched"
@@ -142,7 +140,7 @@ def _coverage(found: "Coverage") -> Iterator[str]:
         yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` happens {why}"
 
 
-def _depth(found: "Depth", rooms: int) -> Iterator[str]:
+def _depth(found: Depth, rooms: int) -> Iterator[str]:
     solvable = len(found.steps)
     line = f"  a success can be reached in {solvable} of {found.rooms} rooms"
     if found.steps:
@@ -160,7 +158,7 @@ def _depth(found: "Depth", rooms: int) -> Iterator[str]:
         yield from _alone(found.alone)
 
 
-def _alone(found: "Alone") -> Iterator[str]:
+def _alone(found: Alone) -> Iterator[str]:
     yield (
         f"  without seeing or hearing an NPC an agent can get at least {found.success:.1%} "
         f"± {2 * found.error:.1%} (two standard errors)"
@@ -180,9 +178,9 @@ def _listed(numbers: Sequence[int]) -> str:
     return f"{word} {shown}" + (f" and {more} more" if more > 0 else "")
 
 
-def _place(span: "Span") -> str:
+def _place(span: Span) -> str:
     return f"{span.file}:{span.line}:{span.column}"
 
 
-def _place_as_object(span: "Span") -> dict[str, Any]:
+def _place_as_object(span: Span) -> dict[str, Any]:
     return {"file": span.file, "line": span.line, "column": span.column}

@@ -84,9 +84,7 @@ def search_rooms(
         program = table.program(row)
         if program.sha256 not in searches:
             searches[program.sha256] = Search(program)
-        state = table.state
-        start = state.registers[row], state.boards[row], state.keys[row]
-        finding = searches[program.sha256].solve(*start, states, clock)
+        finding = searches[program.sha256].solve(*table.start(row), states, clock)
         if clock is not None and clock.is_over and finding.verdict is SearchVerdict.UNDECIDED:
             return
         yield finding
@@ -124,7 +122,7 @@ class Search:
         self._chances = Chances(program, self._relevance, self._relevance.chance)
         self._actions = np.repeat(actions, self._chances.count, axis=0)
         self._at_once = max(1, _ROWS // len(self._actions))
-        self._table = Table([program], self._at_once * len(self._actions), 1)
+        self._table = Table([program], self._at_once * len(self._actions))
         self._table.reset(0, None)
         wanted = [o.success if goals is None else o.name in goals for o in program.outcome_table]
         self._wins = np.array([*wanted, False])
@@ -149,12 +147,9 @@ class Search:
         layer = _Layer(
             registers[None, : state.registers.shape[1]].copy(),
             board[None, : state.boards.shape[1]].copy(),
-            key[None].copy(),
+            self._table.own_keys(key[None]),
             np.zeros(1, np.int64),
         )
-        # Rows of another batch name programs by their place in it.
-        own = [Key.PROGRAM, Key.POOL]
-        layer.keys[:, own] = state.keys[0, own]
         self._parents, self._choices = [-1], [-1]
         self._seen = set(self._digests(layer.registers).tolist())
         while len(layer.nodes):
@@ -182,9 +177,7 @@ class Search:
         state.registers[walks:, Register.ENDED] = 1
         state.registers[:walks] = registers[: state.registers.shape[1]]
         state.boards[:walks] = board[: state.boards.shape[1]]
-        own = state.keys[0, [Key.PROGRAM, Key.POOL]].copy()
-        state.keys[:walks] = key
-        state.keys[:walks, [Key.PROGRAM, Key.POOL]] = own
+        state.keys[:walks] = self._table.own_keys(key)
         ended = state.registers[:walks, Register.ENDED]
         while not ended.all():
             batch.ports.actions[:walks] = acting.next()

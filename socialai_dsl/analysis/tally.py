@@ -99,6 +99,10 @@ def parts_of(checked: CheckedScenario) -> Iterator[TallyItem]:
         for number, state in enumerate(frame.states):
             yield _state(frame, number)
             yield from (_rule(frame, rule) for rule in state.rules)
+    yield from _of_the_world(checked)
+
+
+def _of_the_world(checked: CheckedScenario) -> Iterator[TallyItem]:
     yield from (TallyItem(rule.span, "rule", rule.name) for rule in checked.rules)
     yield from (TallyItem(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
 
@@ -207,10 +211,6 @@ class _Frames:
                     times[_rule(frame, rule)] += fired
                     if aim := rule.goto or rule.goto_now:
                         times[places[aim]] += fired
-        for part, fired in zip(self._of_the_world(), counters[next(numbers) :], strict=False):
+        for part, fired in zip(_of_the_world(self.checked), counters[next(numbers) :], strict=False):
             times[part] += fired
         return times
-
-    def _of_the_world(self) -> Iterator[TallyItem]:
-        yield from (TallyItem(rule.span, "rule", rule.name) for rule in self.checked.rules)
-        yield from (TallyItem(o.condition.span, "outcome", o.name) for o in self.checked.outcomes)

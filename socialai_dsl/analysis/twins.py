@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.analysis.rooms import name_of
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.table import Table, joined
+from socialai_dsl.envs.table import Start, Table, joined
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.semantics.plans import CheckedScenario, Entity
@@ -151,15 +151,15 @@ class Twins:
     ) -> None:
         self._program, self._path, self._values = program, path, values
         self._cues, self._tellers = {*by, SOMEBODY}, Tellers(program, checked)
-        self._table = Table([program], 2 * len(values), 1)
+        self._table = Table([program], 2 * len(values))
         given = [layout for pair in values.tolist() for layout in layouts(program, path, pair)]
         index = np.repeat(np.arange(len(values)), 2)
         self._table.reset(seed, {"index": index, "layout": given})
 
-    def start(self, room: int) -> tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]:
+    def start(self, room: int) -> Start:
         """How the two of a room begin: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
         rows, state = slice(2 * room, 2 * room + 2), self._table.state
-        return state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy()
+        return Start(state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy())
 
     def play(self, actions: Actions) -> TwinComparison:
         """Do the same in both of each pair until they differ or one of them ends."""
@@ -209,7 +209,7 @@ class Script:
     """
 
     def __init__(self, program: Program, path: str, values: Sequence[int], seed: int) -> None:
-        self._table = Table([program], len(values), 1)
+        self._table = Table([program], len(values))
         given = layouts(program, path, values)
         self._table.reset(seed, {"index": np.arange(len(values)), "layout": given})
 
@@ -230,9 +230,10 @@ def pairs_alike(table: Table) -> NDArray[np.bool_]:
     return same
 
 
-def alike(table: Table, rows: slice) -> bool:
-    """Whether rooms that were just drawn show the same."""
+def like_first(table: Table) -> NDArray[np.bool_]:
+    """Whether rows show the same and sound the same as the first, (rows,)."""
     state = table.state
-    return all(
-        bool((array[rows] == array[rows][0]).all()) for array in (state.image, state.extra, state.tokens)
-    )
+    same = np.ones(table.rows, np.bool_)
+    for array in (state.image, state.extra, state.tokens):
+        same &= (array == array[0]).reshape(len(same), -1).all(axis=1)
+    return same

@@ -10,11 +10,12 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
-from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
+from socialai_dsl.authoring.language_schema import FILES
+from socialai_dsl.authoring.names import Name, frame_of, last_key, meant, part_at, visible
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, literals, model_at
-from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.schema.files import ScenarioFile
 from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
@@ -26,14 +27,6 @@ from socialai_dsl.semantics.signatures import (
     Signature,
 )
 from socialai_dsl.source import Data, DataPath, Node
-
-_FILES: Final[dict[str, type[BaseModel]]] = {
-    "scenario": ScenarioFile,
-    "npc": NpcFile,
-    "suite": SuiteFile,
-    "variant": VariantFile,
-    "experiment": ExperimentFile,
-}
 
 _TEXTS: Final = ("say", "ask", "answers")
 """Keys whose values are texts with values in them."""
@@ -120,7 +113,7 @@ def _declares(cursor: Cursor) -> Iterator[Name]:
 
 def _signatures(cursor: Cursor) -> Iterable[Signature]:
     """The instructions that a word may be, those that fit its place first."""
-    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    key = last_key(cursor.path)
     table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
     return (
         ()
@@ -161,7 +154,7 @@ def declaration(document: Node, data: Data, line: int, column: int) -> DataPath 
 
 
 def _named_file(document: Node, cursor: Cursor) -> Path | None:
-    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    key = last_key(cursor.path)
     value = part_at(document.data, cursor.path)
     folder = document.source.path.parent if document.source.path is not None else None
     if folder is None or cursor.is_key or key not in _NAMING_FILES or not isinstance(value, str):
@@ -198,7 +191,7 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
     if cursor.is_key:
         yield from _keys(cursor, cursor.path[:-1], data)
         return
-    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    key = last_key(cursor.path)
     if not cursor.before.strip():
         yield from _keys(cursor, cursor.path, data)
         root = _root(cursor.data)
@@ -302,7 +295,7 @@ def _root(data: Data) -> type[BaseModel] | None:
         return None
     if "library" in data:
         return GrammarLibrary if data["library"] == "grammars" else ObjectLibrary
-    return next((model for kind, model in _FILES.items() if kind in data), None)
+    return next((models[0] for kind, models in FILES.items() if kind in data), None)
 
 
 def _model_of(data: Data, path: DataPath) -> Any:

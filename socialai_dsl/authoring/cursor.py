@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader.reader import read_document
@@ -62,8 +61,7 @@ def completion_at(text: str, line: int, column: int) -> Cursor | None:
 
     The word there is replaced by a marker as a value and as a key, first with all that follows, then without.
     """
-    lines = Source("", text).lines()
-    given = list(lines)
+    given = list(Source("", text).lines())
     if not 1 <= line <= len(given):
         return None
     current = given[line - 1]
@@ -87,22 +85,15 @@ def completion_at(text: str, line: int, column: int) -> Cursor | None:
 
 def _find(text: str) -> tuple[DataPath, bool, str, Data] | None:
     try:
-        data = read_document(Source("", text)).data
+        document = read_document(Source("", text))
     except ScenarioError:
         return None
-    for path, value in _walk(data, ()):
+    for path, part in document.walk():
         if path and isinstance(path[-1], str) and _HERE in path[-1]:
-            return path, True, path[-1].partition(_HERE)[0], data
-        if isinstance(value, str) and _HERE in value:
-            return path, False, value.partition(_HERE)[0], data
+            return path, True, path[-1].partition(_HERE)[0], document.data
+        if isinstance(part.value, str) and _HERE in part.value:
+            return path, False, part.value.partition(_HERE)[0], document.data
     return None
-
-
-def _walk(part: Data, path: DataPath) -> Iterator[tuple[DataPath, Any]]:
-    yield path, part
-    children = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-    for key, child in children:
-        yield from _walk(child, (*path, key))
 
 
 def _closing(text: str) -> str:

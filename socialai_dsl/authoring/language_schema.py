@@ -8,7 +8,7 @@ leave keys out.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +22,16 @@ Schema = dict[str, Any]
 
 _SHIPPED: Final = Path(__file__).with_name("language.schema.json")
 
+FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
+    "scenario": (ScenarioFile,),
+    "npc": (NpcFile,),
+    "suite": (SuiteFile,),
+    "variant": (VariantFile,),
+    "library": (ObjectLibrary, GrammarLibrary),
+    "experiment": (ExperimentFile,),
+}
+"""The key that says the kind of a file -> the models of such files."""
+
 _ANY_VALUE: Final = "AnyValue"
 _PARAMETER: Final = "WholeParameter"
 _REFERENCE: Final = "#/definitions/"
@@ -30,26 +40,18 @@ _MADE_BY_PYDANTIC: Final = "#/$defs/"
 
 def language_schema() -> Schema:
     """One schema for all kinds of file; the key that says the kind chooses."""
-    kinds: dict[str, tuple[type[BaseModel], ...]] = {
-        "scenario": (ScenarioFile,),
-        "npc": (NpcFile,),
-        "suite": (SuiteFile,),
-        "variant": (VariantFile,),
-        "library": (ObjectLibrary, GrammarLibrary),
-        "experiment": (ExperimentFile,),
-    }
-    models = [model for files in kinds.values() for model in files]
+    models = [model for files in FILES.values() for model in files]
     _, made = models_json_schema([(model, "validation") for model in models])
     plain = {name: _plain(schema) for name, schema in made["$defs"].items() if name != "JsonValue"}
     definitions = _Definitions(plain)
     chosen = [
-        {"if": {"required": [kind]}, "then": definitions.kind(kind, files)} for kind, files in kinds.items()
+        {"if": {"required": [kind]}, "then": definitions.kind(kind, files)} for kind, files in FILES.items()
     ]
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "A file of the scenario language",
         "type": "object",
-        "oneOf": [{"required": [kind]} for kind in kinds],
+        "oneOf": [{"required": [kind]} for kind in FILES],
         "allOf": chosen,
         "definitions": {**definitions.used, **_VALUES},
     }
@@ -132,7 +134,7 @@ class _Definitions:
 
         formed = _mapped(schema, deeper)
         if partial:
-            kept = [key for key in formed.get("required", ()) if top and key in _SAYS_THE_KIND]
+            kept = [key for key in formed.get("required", ()) if top and key in FILES]
             formed = {key: value for key, value in formed.items() if key != "required"}
             formed |= {"required": kept} if kept else {}
         if parameters and _is_narrow(formed):
@@ -142,7 +144,6 @@ class _Definitions:
         return formed
 
 
-_SAYS_THE_KIND: Final = ("scenario", "npc", "suite", "variant", "library", "experiment")
 _ANNOTATIONS: Final = ("description", "default", "examples")
 
 
@@ -189,10 +190,3 @@ def _mapped(schema: Schema, change: Callable[[Schema], Schema]) -> Schema:
     if "propertyNames" in made:
         made["propertyNames"] = schema["propertyNames"]
     return made
-
-
-def described_keys(schema: Schema) -> Iterator[tuple[str, str, Schema]]:
-    """Definition, key and schema of every key that a schema describes."""
-    for name, definition in schema["definitions"].items():
-        for key, part in definition.get("properties", {}).items():
-            yield name, key, part

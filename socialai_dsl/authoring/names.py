@@ -47,6 +47,11 @@ def part_at(data: Data, path: DataPath) -> Any:
     return part
 
 
+def last_key(path: DataPath) -> str:
+    """The key that a path ends in, or in whose list; empty for a path without one."""
+    return next((step for step in reversed(path) if isinstance(step, str)), "")
+
+
 def visible(data: Data, path: DataPath) -> list[Name]:
     """The names that an expression at a path may use: those of its frame, then those of the scenario."""
     frame = path[:2] if path[:1] == ("frames",) else ()
@@ -97,7 +102,7 @@ def frame_of(data: Data, member: str) -> str | None:
 
 def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
     """The names among which a word at a place is, with what stands before it in its text."""
-    key = next((step for step in reversed(path) if isinstance(step, str)), "")
+    key = last_key(path)
     if before.endswith("$"):
         return declared(data, ("params",), "a parameter")
     if is_key:

@@ -10,7 +10,6 @@ from typing import Any, Final
 from lsprotocol import types as lsp
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
-from pygls.workspace import TextDocument
 
 from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
@@ -114,10 +113,7 @@ class Server(LanguageServer):
         return lsp.Range(first, last)
 
     def _lines(self, uri: str) -> list[str]:
-        return [line + "\n" for line in Source("", self._text_document(uri).source).lines()]
-
-    def _text_document(self, uri: str) -> TextDocument:
-        return self.workspace.get_text_document(uri)
+        return [line + "\n" for line in Source("", self.workspace.get_text_document(uri).source).lines()]
 
 
 def path_of(uri: str) -> Path:

@@ -1,13 +1,12 @@
 """`socialai check`: what scenarios claim about themselves is tried, and what they contain is played."""
 
 import argparse
-import json
 import sys
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.arguments import add_effort, natural, percent, positive
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.terminal import ProgressLine
+from socialai_dsl.cli.terminal import ProgressLine, json_text
 
 if TYPE_CHECKING:
     from socialai_dsl.analysis.effort import Clock
@@ -106,7 +105,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
             break
     progress.clear()
     if arguments.json:
-        print(json.dumps(documents[0] if arguments.alone else documents, indent=2, ensure_ascii=False))
+        print(json_text(documents[0] if arguments.alone else documents))
     return max(ends)
 
 

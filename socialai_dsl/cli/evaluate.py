@@ -1,22 +1,30 @@
 """`socialai evaluate`: plays the test set with a trained agent, a script, chance or a language model."""
 
 import argparse
-import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import add_options, model_options
+from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.players import (
+    MODEL_PREFIX,
+    Player,
+    default_folder,
+    folder_of,
+    named_agent,
+    require_trainer,
+    resolve_device,
+)
+from socialai_dsl.evaluation.recordings import record
+from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
+from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent, own_scenario
 from socialai_dsl.run_folder import REPLAY, RESULT, SETTINGS, versions, write_json, write_text
 from trainer.config import code_folder
-
-if TYPE_CHECKING:
-    from socialai_dsl.evaluation.players import Player
-    from socialai_dsl.evaluation.testing import Evaluation
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 FIGURES: Final = "evaluation.json"
@@ -80,10 +88,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
-    from socialai_dsl.evaluation.players import named_agent
-    from socialai_dsl.evaluation.recordings import record
-    from socialai_dsl.evaluation.testing import evaluate_agent, own_scenario
-
     if arguments.record is not None and arguments.out is None:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
     if arguments.run == "human" and arguments.json:
@@ -109,24 +113,14 @@ def execute(arguments: argparse.Namespace) -> Exit:
                 replay = f", to look at in {place / REPLAY}" if (place / REPLAY).is_file() else ""
                 print(f"\nepisodes written to {place}{replay}\n", flush=True)
             # After each scenario, so that nothing is lost should the agent not fit the next one.
-            write_text(out / FIGURES, _text(results) + "\n")
+            write_text(out / FIGURES, json_text(results) + "\n")
     if arguments.json:
-        print(_text(results))
+        print(json_text(results))
     return Exit.GOOD
 
 
-def _player(arguments: argparse.Namespace) -> "Player":
+def _player(arguments: argparse.Namespace) -> Player:
     """Who plays, and how."""
-    from socialai_dsl.evaluation.players import (
-        MODEL_PREFIX,
-        Player,
-        default_folder,
-        folder_of,
-        require_trainer,
-        resolve_device,
-    )
-    from socialai_dsl.evaluation.testing import own_scenario
-
     agent = arguments.run
     if agent.startswith(MODEL_PREFIX):
         return Player(agent, out=arguments.out or default_folder(agent), options=model_options(arguments))
@@ -144,11 +138,7 @@ def _player(arguments: argparse.Namespace) -> "Player":
     )
 
 
-def _text(results: list[dict[str, Any]]) -> str:
-    return json.dumps(results, indent=2, ensure_ascii=False)
-
-
-def _result(evaluation: "Evaluation") -> dict[str, Any]:
+def _result(evaluation: Evaluation) -> dict[str, Any]:
     return {
         "scenario": evaluation.scenario,
         "agent": evaluation.player.agent,
@@ -161,9 +151,7 @@ def _result(evaluation: "Evaluation") -> dict[str, Any]:
     }
 
 
-def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
-    from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
-
+def _table(evaluation: Evaluation, figures: dict[str, Any]) -> str:
     parts = [
         [f"{evaluation.scenario}, agent {evaluation.player.agent}"],
         aligned(summary_rows(figures)),

@@ -1,7 +1,7 @@
 """`socialai experiment`: many runs from one file, on one machine or many."""
 
 import argparse
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Final
 
@@ -25,13 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     retry = commands.add_parser("retry", help="let the next `run` repeat failed and cancelled runs")
     cancel = commands.add_parser("cancel", help="give up runs, also those in progress")
-    for command, execute in ((status, _status), (retry, _retry), (cancel, _cancel)):
+    for name, command in (("status", status), ("retry", retry), ("cancel", cancel)):
         command.add_argument("folder", type=Path, metavar="DIR", help="the experiment's folder")
         command.add_argument("--json", action="store_true", help="print a JSON object")
-        command.set_defaults(act=execute)
+        command.set_defaults(act=("experiment_status", name))
     page = commands.add_parser("report", help=report.SUMMARY)
     report.add_arguments(page)
-    page.set_defaults(act=report.execute)
+    page.set_defaults(act=("report", "execute"))
     for command in (retry, cancel):
         command.add_argument(
             "runs", nargs="*", metavar="RUN", help="id of a run or name of a condition (default: all)"
@@ -62,7 +62,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         "--measure", action="store_true", help="measure the speed of networks whose speed is not known"
     )
     parser.add_argument("--json", action="store_true", help="print a JSON object")
-    parser.set_defaults(act=_plan)
+    parser.set_defaults(act=("experiment_plan", "plan"))
 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:
@@ -92,46 +92,14 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         help="update the folder to a changed file; runs that did not change are kept",
     )
     parser.add_argument("--json", action="store_true", help="print only a JSON object, at the end")
-    parser.set_defaults(act=_run)
+    parser.set_defaults(act=("experiment_run", "run"))
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
-    """Do what was asked for."""
-    act: Callable[[argparse.Namespace], Exit] = arguments.act
-    return act(arguments)
-
-
-def _plan(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_plan import plan
-
-    return plan(arguments)
-
-
-def _run(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.evaluation.players import require_trainer
-
-    require_trainer()
-    from socialai_dsl.cli.experiment_run import run
-
-    return run(arguments)
-
-
-def _status(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_status import status
-
-    return status(arguments)
-
-
-def _retry(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_status import retry
-
-    return retry(arguments)
-
-
-def _cancel(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_status import cancel
-
-    return cancel(arguments)
+    """Do what was asked for; the modules of the other actions are not loaded."""
+    module, function = arguments.act
+    end: Exit = getattr(import_module(f"socialai_dsl.cli.{module}"), function)(arguments)
+    return end
 
 
 def _parameter(text: str) -> tuple[str, str | int]:

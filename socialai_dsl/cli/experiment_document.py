@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from socialai_dsl.checking.experiments import LoadedExperiment
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.document import document_of
 from socialai_dsl.experiments.folder import EXPERIMENT, UnreadableError, read_experiment
@@ -27,9 +27,8 @@ def asked_for(arguments: Namespace) -> tuple[dict[str, Any], Path]:
     if not given.exists() and not looks_like_path(arguments.file):
         shipped = shipped_experiments()
         if arguments.file not in shipped:
-            near = did_you_mean(arguments.file, shipped)
-            hint = f"did you mean {near}?" if near else f"those that are shipped are {', '.join(shipped)}"
-            raise UsageError(f"there is no experiment {arguments.file!r}; {hint}")
+            hint = suggested(arguments.file, shipped, f"; those that are shipped are {', '.join(shipped)}")
+            raise UsageError(f"there is no experiment {arguments.file!r}{hint}")
         given = shipped[arguments.file]
     loaded = load_experiment(given)
     profile = _profile(loaded, arguments.profile)
@@ -44,10 +43,9 @@ def _profile(loaded: LoadedExperiment, asked: str | None) -> str | None:
     if asked is None:
         return loaded.experiment.profile
     if asked not in loaded.cells:
-        near = did_you_mean(asked, loaded.experiment.profiles)
-        listed = ", ".join(loaded.experiment.profiles) or "none"
-        hint = f"did you mean {near}?" if near else f"the file's profiles are {listed}"
-        raise UsageError(f"--profile: there is no {asked!r}; {hint}")
+        profiles = loaded.experiment.profiles
+        hint = suggested(asked, profiles, f"; the file's profiles are {', '.join(profiles) or 'none'}")
+        raise UsageError(f"--profile: there is no {asked!r}{hint}")
     return asked
 
 

@@ -6,28 +6,24 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Final
+from typing import IO, Final
 
 from socialai_dsl.errors import RunFailed
 from socialai_dsl.experiments.arguments import typed
-
-if TYPE_CHECKING:
-    from socialai_dsl.experiments.estimate import Speeds
-    from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.estimate import Speeds, remember
+from socialai_dsl.experiments.folder import Run
 
 # A few updates of either kind of network: 8,192 frames each for `fast`, 640 for the paper's presets.
 _FRAMES: Final = {"paper-reference": 2_560, "paper-reference-tuned": 2_560}
 _USUAL_FRAMES: Final = 24_576
 
 
-def measure_unknown(runs: "Sequence[Run]", speeds: "Speeds", stream: IO[str]) -> None:
+def measure_unknown(runs: Sequence[Run], speeds: Speeds, stream: IO[str]) -> None:
     """Measure every network of which no run tells the speed, and remember it for this machine.
 
     Raises:
         RunFailed: such a run broke down.
     """
-    from socialai_dsl.experiments.estimate import remember
-
     measured: set[str] = set()
     for run in runs:
         condition = run.condition
@@ -40,7 +36,7 @@ def measure_unknown(runs: "Sequence[Run]", speeds: "Speeds", stream: IO[str]) ->
     speeds.look_again()
 
 
-def _measured(run: "Run") -> float:
+def _measured(run: Run) -> float:
     """Frames per second after the first update, in which code is compiled and memory is found."""
     options = run.condition["options"]
     frames = _FRAMES.get(str(options["net"]), _USUAL_FRAMES)

@@ -1,13 +1,13 @@
 """`socialai experiment plan`: the runs, the time they need and their progress."""
 
 import argparse
-import json
 import sys
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_document import asked_for, workers
 from socialai_dsl.cli.experiment_measure import measure_unknown
 from socialai_dsl.cli.experiment_tables import plan_figures, plan_text
+from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.experiments.estimate import Speeds
 from socialai_dsl.experiments.folder import runs_of
 
@@ -20,9 +20,5 @@ def plan(arguments: argparse.Namespace) -> Exit:
     if arguments.measure:
         measure_unknown(runs, speeds, sys.stderr)
     figures = plan_figures(document, folder, runs, speeds, arguments.workers or workers(document))
-    print(
-        json.dumps(figures, indent=2, ensure_ascii=False)
-        if arguments.json
-        else plan_text(figures, arguments.each)
-    )
+    print(json_text(figures) if arguments.json else plan_text(figures, arguments.each))
     return Exit.GOOD

@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import json
 import signal
 import sys
 from collections import Counter
@@ -15,7 +14,9 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_document import asked_for, kept, threads, workers
 from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
+from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.players import require_trainer
 from socialai_dsl.experiments.document import differences
 from socialai_dsl.experiments.driver import drive
 from socialai_dsl.experiments.engines import Engine, MissingEngineError
@@ -28,6 +29,7 @@ from socialai_dsl.experiments.work import Outcome
 
 def run(arguments: argparse.Namespace) -> Exit:
     """Make the folder, or go on in it, and do the runs that are left."""
+    require_trainer()
     document, folder = asked_for(arguments)
     if arguments.address is not None and arguments.engine != "ray":
         raise UsageError("--address: only the engine `ray` has one")
@@ -101,11 +103,7 @@ def work_on(
             rounds.close()
             raise KeyboardInterrupt("stopped; the same command goes on from here") from None
     figures = status_figures(document, folder, runs)
-    print(
-        json.dumps(figures, indent=2, ensure_ascii=False)
-        if as_json
-        else "\n" + status_text(figures, each=False)
-    )
+    print(json_text(figures) if as_json else "\n" + status_text(figures, each=False))
     return Exit.GOOD if outcomes["failed"] == 0 else Exit.FINDINGS
 
 

@@ -1,13 +1,13 @@
 """`socialai experiment status`, `retry` and `cancel`: the runs of a folder, and wishes for them."""
 
 import argparse
-import json
 import sys
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_document import kept
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.cli.terminal import counted, json_text
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments import work
 from socialai_dsl.experiments.folder import Run, runs_of
@@ -17,12 +17,7 @@ def status(arguments: argparse.Namespace) -> Exit:
     """Print how far the runs are."""
     document = kept(arguments.folder)
     figures = status_figures(document, arguments.folder, runs_of(arguments.folder, document))
-    text = (
-        json.dumps(figures, indent=2, ensure_ascii=False)
-        if arguments.json
-        else status_text(figures, arguments.each)
-    )
-    print(text)
+    print(json_text(figures) if arguments.json else status_text(figures, arguments.each))
     return Exit.GOOD
 
 
@@ -45,9 +40,9 @@ def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed:
     """Say what became of wishes for runs."""
     missed = [run for run in wanted if run.id not in changed]
     if arguments.json:
-        print(json.dumps({state: sorted(changed), "busy": [run.id for run in missed]}, indent=2))
+        print(json_text({state: sorted(changed), "busy": [run.id for run in missed]}))
     else:
-        print(f"{len(changed)} runs {state}" if len(changed) != 1 else f"1 run {state}")
+        print(f"{counted(len(changed), 'run')} {state}")
         for run in missed:
             print(f"{run.label} ({run.id}): another process is working on it", file=sys.stderr)
     return Exit.FINDINGS if missed else Exit.GOOD
@@ -64,8 +59,7 @@ def _chosen(arguments: argparse.Namespace) -> list[Run]:
         names.setdefault(entry["id"], set()).add(entry["id"])
     for word in arguments.runs:
         if word not in names:
-            near = did_you_mean(word, names)
-            hint = f"; did you mean {near}?" if near else ""
+            hint = suggested(word, names)
             raise UsageError(f"RUN: {arguments.folder} has no run and no condition {word!r}{hint}")
     wanted = set().union(*(names[word] for word in arguments.runs))
     return [run for run in runs if run.id in wanted]

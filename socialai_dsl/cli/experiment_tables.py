@@ -3,18 +3,17 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-if TYPE_CHECKING:
-    from socialai_dsl.experiments.estimate import Speeds
-    from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.estimate import Speeds
+from socialai_dsl.experiments.folder import Run, UnreadableError
 
 _STATES: Final = ("done", "running", "waiting", "failed", "cancelled")
 _MESSAGES_SHOWN: Final = 10
 
 
 def plan_figures(
-    document: Mapping[str, Any], folder: Path, runs: "Sequence[Run]", speeds: "Speeds", workers: int
+    document: Mapping[str, Any], folder: Path, runs: Sequence[Run], speeds: Speeds, workers: int
 ) -> dict[str, Any]:
     """The plan: each run with its state and the seconds left, and the sum.
 
@@ -46,31 +45,27 @@ def plan_figures(
     }
 
 
-def seconds_left(runs: "Sequence[Run]", left: "Sequence[Run]") -> float | None:
+def seconds_left(runs: Sequence[Run], left: Sequence[Run]) -> float | None:
     """The seconds left of some runs, one after the other; None if the speed of one is unknown.
 
     Args:
         runs: all, which tell the speed.
         left: those that are asked about.
     """
-    from socialai_dsl.experiments.estimate import Speeds
-
     speeds = Speeds(runs)
     times = [_remaining(speeds, run) for run in left]
     known = [seconds for seconds in times if seconds is not None]
     return sum(known) if len(known) == len(times) else None
 
 
-def _remaining(speeds: "Speeds", run: "Run") -> float | None:
-    from socialai_dsl.experiments.folder import UnreadableError
-
+def _remaining(speeds: Speeds, run: Run) -> float | None:
     try:
         return speeds.remaining(run)
     except (OSError, UnreadableError):
         return 0.0  # such a run is not worked on
 
 
-def status_figures(document: Mapping[str, Any], folder: Path, runs: "Sequence[Run]") -> dict[str, Any]:
+def status_figures(document: Mapping[str, Any], folder: Path, runs: Sequence[Run]) -> dict[str, Any]:
     """How far each run is."""
     rows = _rows(document, runs)
     return {**_head(document, folder), "states": dict(Counter(row["state"] for row in rows)), "runs": rows}
@@ -80,16 +75,14 @@ def _head(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return {"name": document["name"], "profile": document["profile"], "folder": str(folder)}
 
 
-def _rows(document: Mapping[str, Any], runs: "Sequence[Run]") -> list[dict[str, Any]]:
+def _rows(document: Mapping[str, Any], runs: Sequence[Run]) -> list[dict[str, Any]]:
     conditions: dict[str, list[str]] = {}
     for entry in document["runs"]:
         conditions.setdefault(entry["id"], []).append(entry["condition"])
     return [_row(run, conditions[run.id]) for run in runs]
 
 
-def _row(run: "Run", conditions: Sequence[str]) -> dict[str, Any]:
-    from socialai_dsl.experiments.folder import UnreadableError
-
+def _row(run: Run, conditions: Sequence[str]) -> dict[str, Any]:
     status = run.shown_status()
     done, success = 0, None
     try:
@@ -151,7 +144,8 @@ def status_text(figures: Mapping[str, Any], each: bool) -> str:
         )
         for name, group in _groups(figures["runs"], each)
     ]
-    lines = [_title(figures), "", *_table(header, rows), "", _states(_all_states(figures))]
+    states = _states(row["state"] for row in figures["runs"])
+    lines = [_title(figures), "", *_table(header, rows), "", states]
     said = [row for row in figures["runs"] if row["message"]]
     lines += [
         f"{row['conditions'][0]}, seed {row['seed']} ({row['id']}): {row['message']}"
@@ -184,10 +178,6 @@ def _groups(rows: Sequence[dict[str, Any]], each: bool) -> list[tuple[str, list[
         for condition in row["conditions"]:
             groups.setdefault(condition, []).append(row)
     return list(groups.items())
-
-
-def _all_states(figures: Mapping[str, Any]) -> list[str]:
-    return [row["state"] for row in figures["runs"]]
 
 
 def _states(states: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.diagnostics import CODES, did_you_mean
+from socialai_dsl.diagnostics import CODES, suggested
 from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "explain the code of a finding, or describe a scenario"
@@ -42,9 +42,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
 def _page(typed: str) -> str:
     code = typed.upper()
     if code not in CODES:
-        near = did_you_mean(code, CODES)
-        hint = f"did you mean {near}?" if near else "`socialai explain` lists all codes"
-        raise UsageError(f"CODE: there is no {typed!r}; {hint}")
+        hint = suggested(code, CODES, "; `socialai explain` lists all codes")
+        raise UsageError(f"CODE: there is no {typed!r}{hint}")
     return (pages_folder() / f"{code}.md").read_text(encoding="utf-8")
 
 

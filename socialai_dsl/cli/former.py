@@ -3,13 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-FOR_MAINTAINERS: Final = {
-    "bench": "bench",
-    "fidelity": "fidelity",
-    "reference": "reference",
-    "sheets": "sheets",
-}
-"""A command of earlier versions -> the target of make that does the same in a checkout."""
+FOR_MAINTAINERS: Final = ("bench", "fidelity", "reference", "sheets")
+"""Commands of earlier versions: targets of make of the same names do the same in a checkout."""
 
 _OPTIONS_OF_ORACLES: Final = {"--episodes": "--rooms"}
 _OPTIONS_OF_CURVES: Final = {"--out": "--curves"}
@@ -38,7 +33,7 @@ def current(words: Sequence[str]) -> tuple[list[str], str | None]:
         case "report" if "--no-ceilings" in rest:
             rest = _renamed(rest, {"--no-ceilings": "--no-baselines"})
             return ["report", *rest], "`--no-baselines` instead of `--no-ceilings`"
-        case "check" | "validate" if (found := _format(rest)) is not None:
+        case "check" | "validate" if (found := _option(rest, "--format")) is not None:
             index, length, named = found
             if named == "json":
                 rest[index : index + length] = ["--json"]
@@ -78,21 +73,20 @@ def _renamed(words: Sequence[str], names: Mapping[str, str]) -> list[str]:
     return [names.get(option, option) + equals + value for option, equals, value in parts]
 
 
-def _format(rest: Sequence[str]) -> tuple[int, int, str] | None:
-    """Where `--format` stands, how many words it takes, and what it names."""
+def _option(rest: Sequence[str], name: str) -> tuple[int, int, str] | None:
+    """Where an option stands, how many words it takes, and its value; None where it is not given."""
     for index, word in enumerate(rest):
-        if word.startswith("--format="):
+        if word.startswith(f"{name}="):
             return index, 1, word.partition("=")[2]
-        if word == "--format" and index + 1 < len(rest):
+        if word == name and index + 1 < len(rest):
             return index, 2, rest[index + 1]
     return None
 
 
 def _served(rest: Sequence[str]) -> list[str]:
     """The scenario first."""
-    for index, word in enumerate(rest):
-        if word.startswith("--scenario="):
-            return [word.partition("=")[2], *rest[:index], *rest[index + 1 :]]
-        if word == "--scenario" and index + 1 < len(rest):
-            return [rest[index + 1], *rest[:index], *rest[index + 2 :]]
-    return list(rest)
+    found = _option(rest, "--scenario")
+    if found is None:
+        return list(rest)
+    index, length, scenario = found
+    return [scenario, *rest[:index], *rest[index + length :]]

@@ -1,11 +1,11 @@
 """`socialai list`: the scenarios that ship."""
 
 import argparse
-import json
 from dataclasses import asdict
 from typing import Final
 
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.loader.shipped import ShippedScenario, catalogue
 
 SUMMARY: Final = "list the scenarios that ship, with their variants and parameters"
@@ -27,7 +27,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     words = [word.lower() for word in arguments.words]
     chosen = [one for one in catalogue() if all(word in f"{one.name} {one.about}".lower() for word in words)]
     if arguments.json:
-        print(json.dumps([asdict(one) for one in chosen], indent=2, ensure_ascii=False))
+        print(json_text([asdict(one) for one in chosen]))
     else:
         print("\n".join(line for one in chosen for line in _lines(one)) or "no scenario mentions all of this")
     return Exit.GOOD if chosen else Exit.FINDINGS

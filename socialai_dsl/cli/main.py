@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 from socialai_dsl.cli import former
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.diagnostics import ScenarioError, did_you_mean, printable, render_text
+from socialai_dsl.diagnostics import ScenarioError, printable, render_text, suggested
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.errors import RunFailed, UsageError
 
@@ -33,15 +33,6 @@ _GROUPS: Final = {
 
 _COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 
-_FOR_MAINTAINERS: Final = {
-    "bench": "bench",
-    "fidelity": "fidelity",
-    "oracles": "oracles",
-    "reference": "reference",
-    "sheets": "sheets",
-}
-"""What was a command of ours until 0.1 -> its target of make."""
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
@@ -53,8 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
     if words and words[0] in former.FOR_MAINTAINERS:
-        target = former.FOR_MAINTAINERS[words[0]]
-        print(f"socialai: {words[0]} is for maintainers: `make {target}` in a checkout", file=sys.stderr)
+        print(f"socialai: {words[0]} is for maintainers: `make {words[0]}` in a checkout", file=sys.stderr)
         return Exit.USAGE
     # Loading all commands doubles the time to start; the others are needed for their summaries alone.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
@@ -180,9 +170,9 @@ class _Parser(argparse.ArgumentParser):
         """As argparse does; an option that does not exist is answered with the nearest one that does."""
         known, unknown = super().parse_known_args(args, namespace)
         for word in [word for word in unknown if word.startswith("--")]:
-            near = did_you_mean(word.partition("=")[0], re.findall(r"--[a-z-]+", self.format_help()))
-            cure = f"did you mean {near}?" if near else f"`{self.prog} --help` lists the options"
-            self.exit(Exit.USAGE, f"{self.prog}: there is no option {printable(word)}; {cure}\n")
+            options = re.findall(r"--[a-z-]+", self.format_help())
+            cure = suggested(word.partition("=")[0], options, f"; `{self.prog} --help` lists the options")
+            self.exit(Exit.USAGE, f"{self.prog}: there is no option {printable(word)}{cure}\n")
         return known, unknown
 
     def error(self, message: str) -> NoReturn:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.terminal import counted
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.run_folder import REPLAY, SETTINGS, read_json, write_text
 
@@ -80,7 +81,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         write_text(arguments.out, "[" + ",\n".join(trace.as_json() for trace in traces) + "]\n")
     else:
         write_text(arguments.out, replay_page(traces))
-    print(f"{_count(len(traces), 'episode')} written to {arguments.out}")
+    print(f"{counted(len(traces), 'episode')} written to {arguments.out}")
     return Exit.GOOD
 
 
@@ -149,7 +150,3 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
         usual = "oracle" if scripted_name(scenario) is not None else "random"
         agent = named_agent(arguments.agent or usual, scenario)
     return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

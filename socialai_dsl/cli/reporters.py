@@ -1,11 +1,12 @@
 """Prints the findings of a check for people, for tools and for code hosts."""
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
+from urllib.parse import quote
 from xml.etree import ElementTree
 
+from socialai_dsl.cli.terminal import counted, json_text
 from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, printable, render_text, to_json
 from socialai_dsl.source import Source
 
@@ -57,9 +58,9 @@ def report_text(checked: Sequence[CheckedInput], color: bool) -> str:
     sources = {name: source for c in checked for name, source in c.sources.items()}
     errors = sum(d.severity is Severity.ERROR for d in diagnostics)
     hidden = any(c.left_out for c in checked)
-    counts = [_count(errors, "error") + (" shown, more left out" if hidden else "")]
-    counts.append(_count(len(diagnostics) - errors, "warning"))
-    summary = f"{_count(len(checked), 'file')} checked: {', '.join(counts)}"
+    counts = [counted(errors, "error") + (" shown, more left out" if hidden else "")]
+    counts.append(counted(len(diagnostics) - errors, "warning"))
+    summary = f"{counted(len(checked), 'file')} checked: {', '.join(counts)}"
     more = (
         [f"`socialai explain {diagnostics[0].code}` says more about {diagnostics[0].code}"]
         if diagnostics
@@ -71,7 +72,7 @@ def report_text(checked: Sequence[CheckedInput], color: bool) -> str:
 def report_json(checked: Sequence[CheckedInput], color: bool) -> str:
     """An array of findings."""
     del color
-    return json.dumps(to_json(_all(checked)), indent=2, ensure_ascii=False)
+    return json_text(to_json(_all(checked)))
 
 
 def report_github(checked: Sequence[CheckedInput], color: bool) -> str:
@@ -87,8 +88,7 @@ def report_github(checked: Sequence[CheckedInput], color: bool) -> str:
             "title": d.code,
         }
         properties = ",".join(f"{key}={_escape(str(value), ':,')}" for key, value in place.items())
-        message = d.text if d.hint is None else f"{d.text}\n{printable(d.hint)}"
-        lines.append(f"::{d.severity.value} {properties}::{_escape(message)}")
+        lines.append(f"::{d.severity.value} {properties}::{_escape(_with_hint(d))}")
     return "\n".join(lines)
 
 
@@ -110,7 +110,7 @@ def report_sarif(checked: Sequence[CheckedInput], color: bool) -> str:
         "version": "2.1.0",
         "runs": [run],
     }
-    return json.dumps(log, indent=2, ensure_ascii=False)
+    return json_text(log)
 
 
 def report_junit(checked: Sequence[CheckedInput], color: bool) -> str:
@@ -125,7 +125,7 @@ def report_junit(checked: Sequence[CheckedInput], color: bool) -> str:
             suite, "testcase", classname="socialai.validate", name=printable(c.name)
         )
         if c.errors:
-            failure = ElementTree.SubElement(case, "failure", message=_count(c.errors, "error"))
+            failure = ElementTree.SubElement(case, "failure", message=counted(c.errors, "error"))
             failure.text = render_text(c.diagnostics, c.sources)
         elif c.diagnostics:
             ElementTree.SubElement(case, "system-out").text = render_text(c.diagnostics, c.sources)
@@ -147,8 +147,9 @@ def _all(checked: Iterable[CheckedInput]) -> list[Diagnostic]:
     return list(dict.fromkeys(d for c in checked for d in c.diagnostics))
 
 
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+def _with_hint(diagnostic: Diagnostic) -> str:
+    hint = diagnostic.hint
+    return diagnostic.text if hint is None else f"{diagnostic.text}\n{printable(hint)}"
 
 
 def _escape(text: str, also: str = "") -> str:
@@ -160,20 +161,11 @@ def _escape(text: str, also: str = "") -> str:
 def _sarif_result(diagnostic: Diagnostic) -> dict[str, Any]:
     span = diagnostic.span
     region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + span.width}
-    location = {"physicalLocation": {"artifactLocation": {"uri": _uri(span.file)}, "region": region}}
+    uri = quote(span.file.replace("\\", "/"))
+    location = {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": region}}
     return {
         "ruleId": diagnostic.code,
         "level": diagnostic.severity.value,
-        "message": {
-            "text": diagnostic.text
-            if diagnostic.hint is None
-            else f"{diagnostic.text}\n{printable(diagnostic.hint)}"
-        },
+        "message": {"text": _with_hint(diagnostic)},
         "locations": [location],
     }
-
-
-def _uri(file: str) -> str:
-    from urllib.parse import quote
-
-    return quote(file.replace("\\", "/"))

@@ -1,12 +1,12 @@
 """`socialai-run`: checks a scenario, trains an agent on it, evaluates it, leaves a folder of results."""
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.run_folder import (
     REPLAY,
     RESULT,
@@ -93,7 +93,7 @@ def _run(
         draw_curve(config, folder, result)
         write_card(config, loaded, folder, Path(agent), result)
     write_json(folder / RESULT, result)  # last, so that its presence means a complete run
-    print(json.dumps(result, indent=2, ensure_ascii=False) if arguments.json else _table(result, folder))
+    print(json_text(result) if arguments.json else _table(result, folder))
     return Exit.GOOD
 
 

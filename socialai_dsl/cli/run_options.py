@@ -9,7 +9,7 @@ from typing import Any, Final, get_args
 
 from pydantic import ValidationError
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.settings import resolved_config
 from socialai_dsl.run_folder import read_config
@@ -186,9 +186,8 @@ def _read_hyper(given: Sequence[str]) -> dict[str, Any]:
         if name in FLAGS:
             raise UsageError(f"--hyper: {name} has an option of its own, --{name.replace('_', '-')}")
         if name not in HYPER:
-            near = did_you_mean(name, HYPER)
-            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(HYPER)}"
-            raise UsageError(f"--hyper: got {name!r}; {hint}")
+            hint = suggested(name, HYPER, f"; expected one of {', '.join(HYPER)}")
+            raise UsageError(f"--hyper: got {name!r}{hint}")
         if name in found:
             raise UsageError(f"--hyper: {name} is given twice")
         found[name] = _plain_value(name, written)

@@ -33,7 +33,9 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
         print(socialai_dsl.compile(socialai_dsl.load(arguments.scenario)).listing())
         return Exit.GOOD
-    resolved = _resolved(arguments.scenario)
+    from socialai_dsl.frontend import check
+
+    resolved = check(arguments.scenario).read()
     if arguments.origin:
         for line in _origins(resolved):
             print(printable(line))
@@ -42,22 +44,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
         print(yaml.safe_dump(resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
     return Exit.GOOD
-
-
-def _resolved(name: str) -> "ResolvedFile":
-    """What is written in a file, or under a name, of any kind.
-
-    Raises:
-        ScenarioError: it has mistakes.
-    """
-    from socialai_dsl.diagnostics import ScenarioError
-    from socialai_dsl.frontend import check
-
-    result = check(name)
-    if result.has_errors:
-        raise ScenarioError(result.diagnostics, result.sources)
-    assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
-    return result.resolved
 
 
 def _origins(resolved: "ResolvedFile") -> Iterator[str]:

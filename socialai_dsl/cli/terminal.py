@@ -1,5 +1,6 @@
-"""The abilities of an output stream: colours, width, redrawing."""
+"""What commands print: its colours, lines that are written over, JSON, counts."""
 
+import json
 import os
 from collections.abc import Callable
 from typing import IO, Any
@@ -8,6 +9,16 @@ from typing import IO, Any
 def shows_color(stream: IO[Any]) -> bool:
     """Whether to colour: a terminal that is not dumb, unless NO_COLOR is set to anything (no-color.org)."""
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def json_text(value: Any) -> str:
+    """A value as the JSON that commands print."""
+    return json.dumps(value, indent=2, ensure_ascii=False)
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 file`, `2 files`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class ProgressLine:

@@ -11,9 +11,9 @@ from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Text
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.episode_trace import Trace, TraceStep
+from socialai_dsl.evaluation.episode_trace import EpisodeTracer, Trace, TraceStep, reset_of
 
 SUMMARY: Final = "print one episode step by step: the rules that fired, and why the others did not"
 
@@ -75,8 +75,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play the episode and print it."""
-    from socialai_dsl.evaluation.episode_trace import EpisodeTracer, reset_of
-
     reset = reset_of(arguments.seed, arguments.index, arguments.test_episode, arguments.layout)
     if arguments.json and (arguments.why or arguments.first > 1):
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
@@ -104,8 +102,7 @@ def _check_names(names: list[str], trace: Trace) -> None:
     groups = {name.partition("[")[0] for name in trace.names}
     for name in names:
         if name not in known and name not in groups:
-            near = did_you_mean(name, known)
-            hint = f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(known)}"
+            hint = suggested(name, known, f"; expected one of {', '.join(known)}", repr)
             raise UsageError(f"--why: got {name!r}{hint}")
 
 

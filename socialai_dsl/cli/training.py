@@ -7,20 +7,26 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
+import socialai_dsl
+from socialai_dsl.checking.loaded import Loaded, about_of
+from socialai_dsl.cli.learnt import Learnt
+from socialai_dsl.cli.progress import TrainingProgress
 from socialai_dsl.errors import RunFailed, UsageError
+from socialai_dsl.evaluation.model_card import FILE, model_card
 from socialai_dsl.evaluation.scripts import scripted_name, with_script
+from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.program_suite import Playable
+from socialai_dsl.replay.endings import endings_of
+from socialai_dsl.replay.page import replay_page
 from socialai_dsl.run_folder import LOCK, REPLAY, SETTINGS, scenario_folder_name, write_text
 from trainer.config import RunConfig
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.cli.tracking import WandbTracker
-    from socialai_dsl.evaluation.testing import Evaluation
-    from socialai_dsl.program_suite import Playable
 
 
 def train_in(
-    config: "RunConfig", loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+    config: RunConfig, loaded: Loaded, program: Playable, folder: Path, resume: bool, stream: IO[str]
 ) -> str:
     """Train in the run's folder and return the path of the final checkpoint."""
     try:
@@ -58,7 +64,7 @@ def training_figures(folder: Path) -> dict[str, Any]:
 
 
 def train_agent(
-    config: RunConfig, loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+    config: RunConfig, loaded: Loaded, program: Playable, folder: Path, resume: bool, stream: IO[str]
 ) -> Path:
     """Train, show the progress on `stream`, and return the path of the final checkpoint.
 
@@ -75,10 +81,6 @@ def train_agent(
         RunFailed: training broke down.
         KeyboardInterrupt: with a message that says how to go on.
     """
-    import socialai_dsl
-    from socialai_dsl.cli.learnt import Learnt
-    from socialai_dsl.cli.progress import TrainingProgress
-    from socialai_dsl.replay.endings import endings_of
     from trainer.errors import TrainingStopped
     from trainer.ppo import train
 
@@ -140,7 +142,7 @@ def _tracker(config: RunConfig, folder: Path) -> "WandbTracker | None":
     return WandbTracker(config.wandb, folder, config.model_dump(), name)
 
 
-def draw_curve(config: "RunConfig", folder: Path, result: dict[str, Any]) -> None:
+def draw_curve(config: RunConfig, folder: Path, result: dict[str, Any]) -> None:
     """Draw the learning curve of a run into its folder."""
     from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
 
@@ -151,12 +153,9 @@ def draw_curve(config: "RunConfig", folder: Path, result: dict[str, Any]) -> Non
 
 
 def write_card(
-    config: "RunConfig", loaded: "Loaded", folder: Path, weights: Path, result: dict[str, Any]
+    config: RunConfig, loaded: Loaded, folder: Path, weights: Path, result: dict[str, Any]
 ) -> None:
     """Write the model card of a run into its folder."""
-    from socialai_dsl.checking.loaded import about_of
-    from socialai_dsl.evaluation.model_card import FILE, model_card
-
     place = weights.relative_to(folder).as_posix()
     write_text(folder / FILE, model_card(config, result, about_of(loaded), folder.as_posix(), place))
 
@@ -165,13 +164,11 @@ _REPLAYED: Final = 5
 """The number of failures, and of successes, that a run films."""
 
 
-def record_run(evaluation: "Evaluation", folder: Path, label: str) -> None:
+def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     """Film the first success, or the first episode if there is none, and where there are both, the first failure.
 
     A page replays some failures and successes.
     """
-    from socialai_dsl.replay.page import replay_page
-
     write_text(folder / REPLAY, replay_page(evaluation.traces(evaluation.to_replay(_REPLAYED))))
     success = evaluation.result.success
     shown = {"episode": int(success.argmax())}

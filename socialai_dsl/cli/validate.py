@@ -124,10 +124,12 @@ def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagno
     found: list[Diagnostic] = []
     progress = ProgressLine(sys.stderr)
     say = progress.above(sys.stdout) if arguments.format == "text" else None
-    for scenario, called in scenarios_of(result.name):
+    # What was checked, also where it came from standard input.
+    texts = {source.path: source for source in result.sources.values() if source.path is not None}
+    for scenario, called in scenarios_of(result.name, texts):
         clock = Clock(arguments.seconds or None, progress.show)
         effort = Effort(arguments.rooms, clock=clock)
-        report = check_scenario(scenario, called, effort, deep=True, say=say)
+        report = check_scenario(scenario, called, effort, deep=True, say=say, texts=texts)
         progress.clear()
         found += report.findings()
         if report.interrupted:

@@ -19,8 +19,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.explain import Recording, Start
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
 from socialai_dsl.semantics.terms import NOTED
@@ -76,7 +75,7 @@ class Asker:
     def __init__(self, loaded: Loaded) -> None:
         playable, self._probes = compile_asking_loaded(loaded)
         self.sha256 = sha256(f"{playable.sha256} {self._probes}".encode()).hexdigest()
-        self._table = Table([playable], 1, 1)
+        self._table = Table([playable], 1)
         self._lookers = [
             _Looker(program) if probes else None
             for program, probes in zip(self._table.programs, self._probes, strict=True)
@@ -127,7 +126,7 @@ class Asker:
         ]
         if not waiting:
             return []
-        looker.look(Recording.of(table, 0).start, begins)
+        looker.look(table.start(0), begins)
         questions = []
         for probe in waiting:
             if looker.is_set(probe.asked):
@@ -142,7 +141,7 @@ class _Looker:
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._table = Table([program], 1, 1)
+        self._table = Table([program], 1)
         self._table.batch.ports.actions[0] = 0
         self._table.batch.ports.actions[0, 0] = len(program.actions)
         self._registers = self._table.state.registers[0]
@@ -156,10 +155,7 @@ class _Looker:
 
     def _note(self, start: Start, before: NDArray[np.int16] | None = None) -> None:
         state = self._table.state
-        own = [Key.PROGRAM, Key.POOL]
-        key = start.key.copy()
-        key[own] = state.keys[0, own]
-        state.keys[0] = key
+        state.keys[0] = self._table.own_keys(start.key)
         self._registers[:] = start.registers[: len(self._registers)]
         state.boards[0] = start.board[: state.boards.shape[1]]
         self._registers[Register.ENDED], self._registers[Register.OUTCOME] = 0, -1

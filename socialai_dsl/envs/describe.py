@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -47,25 +48,23 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
             if owned is not None:
                 described[key] = _value(program, registers, owned)
         if beliefs := addresses.beliefs.get(str(entity)):
-            described["believes"] = {key: _value(program, registers, name) for key, name in beliefs.items()}
+            described["believes"] = _values(program, registers, beliefs)
         if looks := addresses.looks.get(str(entity)):
-            described["looks"] = {key: _value(program, registers, name) for key, name in looks.items()}
+            described["looks"] = _values(program, registers, looks)
         if entity.index is None:
             state[entity.key] = described
         else:
             state.setdefault(entity.key, []).append(described)
     if addresses.one_of:
-        state["one_of"] = {key: _value(program, registers, n) for key, n in addresses.one_of.items()}
-    state["let"] = {key: _value(program, registers, name) for key, name in addresses.plain.items()}
+        state["one_of"] = _values(program, registers, addresses.one_of)
+    state["let"] = _values(program, registers, addresses.plain)
     for key, acts in addresses.sequences.items():
         state["let"][key] = [_act(program, registers, acts, k) for k in range(acts.length)]
     if addresses.world:
-        state["state"] = {key: _value(program, registers, name) for key, name in addresses.world.items()}
+        state["state"] = _values(program, registers, addresses.world)
     for place, keys in addresses.kept.items():
         section, _, key = place.partition(".")
-        state.setdefault(section, {})[key] = {
-            word: _value(program, registers, name) for word, name in keys.items()
-        }
+        state.setdefault(section, {})[key] = _values(program, registers, keys)
     if addresses.memories:
         state["memory"] = _memories(program, registers, addresses)
     if state["t"]:
@@ -84,6 +83,10 @@ def history(program: Program, registers: Row) -> list[str]:
 
 def _value(program: Program, registers: Row, name: RegisterName) -> Any:
     return shown(program, name, int(registers[name.register]))
+
+
+def _values(program: Program, registers: Row, names: Mapping[str, RegisterName]) -> dict[str, Any]:
+    return {key: _value(program, registers, name) for key, name in names.items()}
 
 
 def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:

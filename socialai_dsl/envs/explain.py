@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.compilation import ConditionPart, Note, Value, compile_noting
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.envs.values import shown, utterance_text
 from socialai_dsl.program import (
     CELL,
@@ -41,27 +40,12 @@ from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import spelt
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """A moment of an environment: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
-
-    registers: NDArray[np.int16]
-    board: NDArray[np.uint32]
-    key: NDArray[np.uint64]
-
-
 @dataclass
 class Recording:
     """A moment, and the actions since then, int64 (heads,) as bytes each."""
 
     start: Start
     actions: list[bytes] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, table: Table, row: int) -> Recording:
-        """From now on."""
-        state = table.state
-        return cls(Start(state.registers[row].copy(), state.boards[row].copy(), state.keys[row].copy()))
 
 
 # -- who or what stands in the way ---------------------------------------------------------------------------
@@ -194,7 +178,7 @@ class Explainer:
         self._checked = scenario
         self._program = program
         self._noting = compile_noting(scenario)
-        self._table = Table([_alone(self._noting.program, suite, number)], 1, 1)
+        self._table = Table([_alone(self._noting.program, suite, number)], 1)
         self._table.reset(0, None)
 
     def explain(self, recording: Recording, reached: NDArray[np.int16] | None) -> dict[str, Any]:
@@ -219,10 +203,8 @@ class Explainer:
     def _play(self, recording: Recording) -> NDArray[np.int64]:
         """Play the recording; which counters the last step has raised."""
         state, batch = self._table.state, self._table.batch
-        own = [Key.PROGRAM, Key.POOL]
-        start, key = recording.start, recording.start.key.copy()
-        key[own] = state.keys[0, own]
-        state.keys[0] = key
+        start = recording.start
+        state.keys[0] = self._table.own_keys(start.key)
         state.registers[:] = 0
         state.registers[0, : self._noting.first] = start.registers[: self._noting.first]
         state.boards[0] = start.board[: state.boards.shape[1]]
@@ -329,7 +311,8 @@ class _Notes:
         if count == 0:
             if not said:
                 return "nothing was heard"
-            near, far = self._voice()
+            agent = self.program.table(Header.ENTITY_AT)[0]
+            near, far = int(agent[EntityColumn.NEAR]), int(agent[EntityColumn.FAR])
             if near <= distance <= far:
                 return f'nothing was heard, though the agent said "{own}"'
             return (
@@ -338,10 +321,6 @@ class _Notes:
         spoken = int(self.registers[Register.CLASS])
         texts = [own if said and number == spoken else self._text(number) for number in classes[:count]]
         return "heard " + " and ".join(dict.fromkeys(f'"{text}"' for text in texts))
-
-    def _voice(self) -> tuple[int, int]:
-        agent = self.program.table(Header.ENTITY_AT)[0]
-        return int(agent[EntityColumn.NEAR]), int(agent[EntityColumn.FAR])
 
     def _text(self, number: int) -> str:
         """A line of this class: one that was said in this step, if it can be told."""
@@ -372,7 +351,7 @@ class _Story:
             yield from self._frame(frame, range(counter, counter + size))
             counter += size
         for number in range(counter, counter + len(self.checked.rules)):
-            yield from self._asked(number, self.rules.get(number), "world", {}, "world rule")
+            yield from self._asked(number, "world", {}, "world rule")
         ended = self.raised[counter + len(self.checked.rules) :]
         listed = [(note.plan, note, bool(ended[number])) for number, note in sorted(self.outcomes.items())]
         yield from self._list(listed, "outcome", {}, "outcome")
@@ -381,7 +360,7 @@ class _Story:
         if frame.steps:
             for number, step in zip(counters, frame.steps, strict=True):
                 named = {"state": step.state} if step.state else {}
-                yield from self._asked(number, self.rules.get(number), frame.member, named, "step")
+                yield from self._asked(number, frame.member, named, "step")
             return
         numbers = iter(counters)
         lists: list[tuple[str, str, list[tuple[Any, Note | None, bool]]]] = []
@@ -416,10 +395,9 @@ class _Story:
             if fired:
                 before = _span(plan)
 
-    def _asked(
-        self, number: int, note: Note | None, who: str, more: dict[str, Any], kind: str
-    ) -> Iterator[dict[str, Any]]:
+    def _asked(self, number: int, who: str, more: dict[str, Any], kind: str) -> Iterator[dict[str, Any]]:
         """One that is asked for itself; nothing if it was not."""
+        note = self.rules.get(number)
         fired = bool(self.raised[number])
         if note is None or not (fired or self.notes.number(note)):
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,9 @@ from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.values import (
     ActRegisters,
     addresses_of,
-    cell_pair,
     entry_words,
     meant,
+    parts_of,
     read,
     utterance_number,
     whole_number,
@@ -114,11 +115,6 @@ _KEYS = {
 _OTHER_KEYS = ("t", "room", "one_of", "let", "state", "memory", "last", "heard", "pending")
 
 
-def pinned_member(given: Any, members: Sequence[str]) -> int:
-    """Which member of a suite a layout's `member` names. Raises ValueError if there is none of that name."""
-    return word("member", given, members)
-
-
 def pins_of(program: Program, layout: Mapping[str, Any], in_suite: bool = False) -> NDArray[np.int16]:
     """Pinned registers, int16 (R,): the value of each register that the layout gives, PIN_NONE for the others.
 
@@ -160,8 +156,8 @@ class _Layout:
         for number, thing in self.carried.items():
             self._carries(number, thing)
         self._one_of(layout.get("one_of"))
-        self._let(layout.get("let"))
-        self._world(layout.get("state"))
+        self._values("let", layout.get("let"), self.addresses.plain, self.addresses.sequences)
+        self._values("state", layout.get("state"), self.addresses.world)
         self._memory(layout.get("memory"))
         self._last(layout.get("last"))
         self._heard(layout.get("heard"))
@@ -203,9 +199,7 @@ class _Layout:
         if self.program.entities[numbers[0]].index is None:
             self._entity(key, numbers[0], given)
             return
-        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) > len(numbers):
-            raise ValueError(f"{key}: got {given!r}; expected a list of at most {len(numbers)}")
-        for i, (number, one) in enumerate(zip(numbers, given, strict=False)):
+        for i, (number, one) in enumerate(zip(numbers, _listed(key, given, len(numbers)), strict=False)):
             if one:
                 self._entity(f"{key}[{i}]", number, one)
 
@@ -225,8 +219,8 @@ class _Layout:
             if given.get(name) is not None:
                 self._owned(key, name, given[name])
         self._gestures(key, number, given)
-        self._noted(f"{key}.believes", self.addresses.beliefs.get(key, {}), given.get("believes"))
-        self._noted(f"{key}.looks", self.addresses.looks.get(key, {}), given.get("looks"))
+        self._values(f"{key}.believes", given.get("believes"), self.addresses.beliefs.get(key, {}))
+        self._values(f"{key}.looks", given.get("looks"), self.addresses.looks.get(key, {}))
         if given.get("carries") is not None:
             self.carried[number] = given["carries"]
         inside = given.get("inside")
@@ -271,14 +265,6 @@ class _Layout:
         for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1), (Field.CARRIER, 1 + number)):
             self._set(thing, field, value)
 
-    def _noted(self, place: str, known: Mapping[str, RegisterName], given: Any) -> None:
-        """What a member of the cast takes for true, or what looks something has, each in a register of its own."""
-        for key, value in self._entries(place, given):
-            if key not in known:
-                raise ValueError(f"{place}: there is no {key!r}{meant(key, known)}")
-            if value is not None:
-                self._pin(known[key], value, f"{place}.{key}")
-
     def _set(self, number: int, field: Field, value: int) -> None:
         self.row[FIRST_ENTITY + ENTITY_FIELDS * number + field] = value
 
@@ -300,7 +286,7 @@ class _Layout:
         """A cell of the room."""
         is_given = self.row[Register.WIDTH] != PIN_NONE
         hint = "" if is_given else " (the smallest room; give `room` for a larger one)"
-        across, down = cell_pair(key, given)
+        across, down = parts_of(key, given, 2, "[x, y]")
         x = whole_number(f"{key}[0]", across, 0, self.width - 1, hint)
         return x, whole_number(f"{key}[1]", down, 0, self.height - 1, hint)
 
@@ -337,35 +323,27 @@ class _Layout:
             if value is not None:
                 self._pin(name, value, f"one_of.{key}")
 
-    def _let(self, given: Any) -> None:
-        if not given:
-            return
-        self._mapping("let", given)
-        plain, sequences = self.addresses.plain, self.addresses.sequences
-        for key, value in given.items():
-            if self._kept(f"let.{key}", value):
+    def _values(
+        self,
+        place: str,
+        given: Any,
+        known: Mapping[str, RegisterName],
+        sequences: Mapping[str, ActRegisters] = MappingProxyType({}),
+    ) -> None:
+        """Registers that have a name of their own there, and the acts of sequences."""
+        for key, value in self._entries(place, given):
+            if self._kept(f"{place}.{key}", value):
                 continue
-            if key not in plain and key not in sequences:
-                raise ValueError(f"let: there is no {key!r}{meant(key, [*plain, *sequences])}")
+            if key not in known and key not in sequences:
+                raise ValueError(f"{place}: there is no {key!r}{meant(key, [*known, *sequences])}")
             if value is None:
                 continue
-            if key in plain:
-                self._pin(plain[key], value, f"let.{key}")
-            else:
-                acts = sequences[key]
-                for k, act in enumerate(_listed(f"let.{key}", value, acts.length)):
-                    if act is not None:
-                        self._act(acts, k, act, f"let.{key}[{k}]")
-
-    def _world(self, given: Any) -> None:
-        """The registers of the scenario's `state`."""
-        for key, value in self._entries("state", given):
-            if self._kept(f"state.{key}", value):
+            if key in known:
+                self._pin(known[key], value, f"{place}.{key}")
                 continue
-            if key not in self.addresses.world:
-                raise ValueError(f"state: there is no {key!r}{meant(key, self.addresses.world)}")
-            if value is not None:
-                self._pin(self.addresses.world[key], value, f"state.{key}")
+            for k, act in enumerate(_listed(f"{place}.{key}", value, sequences[key].length)):
+                if act is not None:
+                    self._act(sequences[key], k, act, f"{place}.{key}[{k}]")
 
     def _kept(self, key: str, given: Any) -> bool:
         """Registers that there are for each of a group: a mapping of keys to values; whether `key` names some."""
@@ -396,9 +374,7 @@ class _Layout:
 
     def _act(self, acts: ActRegisters, k: int, given: Any, key: str) -> None:
         """An element of a sequence or memory: [move, utterance], where None is silence."""
-        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
-            raise ValueError(f"{key}: got {given!r}; expected [move, utterance]")
-        move, said = given
+        move, said = parts_of(key, given, 2, "[move, utterance]")
         if move is not None:
             self._pin(acts.moves[k], move, f"{key}[0]")
         if k in acts.utterances:
@@ -451,12 +427,10 @@ class _Layout:
         for key, classes in self._entries("pending", given):
             if key not in inboxes:
                 raise ValueError(f"pending: there is no {key!r} who listens{meant(key, inboxes)}")
-            size = self.program.header(Header.INBOX_SIZE)
-            if not isinstance(classes, Sequence) or isinstance(classes, str) or len(classes) > size:
-                raise ValueError(f"pending.{key}: got {classes!r}; expected a list of at most {size}")
-            self.row[inboxes[key]] = len(classes)
+            entries = _listed(f"pending.{key}", classes, self.program.header(Header.INBOX_SIZE))
+            self.row[inboxes[key]] = len(entries)
             words = entry_words(self.program)
-            for i, entry in enumerate(classes):
+            for i, entry in enumerate(entries):
                 first = inboxes[key] + 1 + words * i
                 self.row[first : first + words] = self._entry(f"pending.{key}[{i}]", entry, words)
 
@@ -465,9 +439,7 @@ class _Layout:
         highest = self.program.header(Header.CLASSES) - 1
         if words == 1:
             return [whole_number(key, given, 1, highest)]
-        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != words:
-            raise ValueError(f"{key}: got {given!r}; expected [class, speaker, noun]")
-        number, speaker, noun = given
+        number, speaker, noun = parts_of(key, given, words, "[class, speaker, noun]")
         return [
             whole_number(f"{key}[0]", number, 1, highest),
             word(f"{key}[1]", speaker, self.names),

@@ -32,7 +32,6 @@ class CommonSpace:
         playable: the scenario or suite; of several their mixture.
         programs: the programs of all of them. members: what each is called among several.
         pools: for each scenario or suite given, the numbers of its programs.
-        outcomes: every way an episode can end: its name and whether it is a success.
         length: tokens in a history, L.
         parts: the programs as the engine takes them.
         channels: of the picture: those that one of the programs shows.
@@ -43,7 +42,6 @@ class CommonSpace:
     programs: tuple[Program, ...]
     members: tuple[str, ...]
     pools: tuple[tuple[int, ...], ...]
-    outcomes: tuple[tuple[str, bool], ...]
     length: int
     parts: tuple[LinkedProgram, ...]
     channels: tuple[str, ...]
@@ -54,9 +52,8 @@ class CommonSpace:
         """Scenarios and suites, each given once."""
         playable = playables[0] if len(playables) == 1 else mixture(playables)
         suite = playable if isinstance(playable, ProgramSuite) else mixture([playable])
-        outcomes = tuple((outcome.name, outcome.success) for outcome in playable.outcome_table)
         channels = channels_of(suite.programs)
-        parts = _parts(suite, [name for name, _ in outcomes], playable, channels)
+        parts = _parts(suite, playable, channels)
         length = max(program.header(Header.TOKENS) for program in suite.programs)
         highest = np.max([_highest_codes(program) for program in suite.programs], axis=0).tolist()
         highest += [NO_GESTURE] * (len(channels) - len(highest))
@@ -65,7 +62,6 @@ class CommonSpace:
             suite.programs,
             suite.members,
             _pools(playables),
-            outcomes,
             length,
             parts,
             channels,
@@ -101,12 +97,10 @@ def _pools(playables: Sequence[Playable]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(range(end - size, end)) for size, end in zip(sizes, ends, strict=True))
 
 
-def _parts(
-    suite: ProgramSuite, outcomes: Sequence[str], playable: Playable, channels: Sequence[str]
-) -> tuple[LinkedProgram, ...]:
+def _parts(suite: ProgramSuite, playable: Playable, channels: Sequence[str]) -> tuple[LinkedProgram, ...]:
     """Each program with its links into the batch."""
     token = {word: i for i, word in enumerate(playable.vocabulary)}
-    ending = {name: i for i, name in enumerate(outcomes)}
+    ending = {name: i for i, name in enumerate(playable.outcomes)}
     return tuple(
         LinkedProgram(
             words=program.words,
@@ -158,14 +152,10 @@ def _highest_codes(program: Program) -> tuple[int, int, int, int]:
     rooms = words[h(Header.ROOM_AT) : h(Header.FRAME_AT)].view(np.uint32) if h(Header.FRAME_AT) else words[:0]
     width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
     cells = rooms.reshape(-1, room_words(width, height))[:, : width * height + 1]
-    kinds = max((int(kind) for kind in _kinds(program)), default=0)
+    kinds = int(program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].max(initial=0))
     return (
         max(int(types[:, TypeColumn.CODE].max()), int((cells & 255).max())),
         5,
         max(kinds, int(types[:, TypeColumn.STATUS].max()), int((cells >> 16 & 255).max())),
         max(3, int(types[:, TypeColumn.ORIENTATION].max()), int((cells >> 24).max())),
     )
-
-
-def _kinds(program: Program) -> list[int]:
-    return program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].tolist()  # type: ignore[no-any-return]

@@ -127,21 +127,25 @@ def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:
 
 def looks_of_npcs(table: Table, row: int) -> dict[EntityName, Code]:
     """The look of each NPC in a row, as if it looked down; also of those that have left or are hidden."""
-    program, registers = table.program(row), table.state.registers[row]
     return {
         entity: (NPC, int(fields[Field.COLOR]), int(fields[Field.STATUS]), _DOWN)
-        for number, entity in enumerate(program.entities)
+        for entity, fields in zip(table.program(row).entities, _fields(table, row), strict=True)
         if entity.role == "npc"
-        for fields in [registers[FIRST_ENTITY + ENTITY_FIELDS * number :]]
     }
+
+
+def _fields(table: Table, row: int) -> NDArray[np.int16]:
+    """The registers of the entities in a row, (entities, ENTITY_FIELDS)."""
+    count = len(table.program(row).entities)
+    return table.state.registers[row, FIRST_ENTITY:][: ENTITY_FIELDS * count].reshape(-1, ENTITY_FIELDS)
 
 
 def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
     """(x, y) -> the object in whose cell an NPC stands and is drawn; a cell of the canvas shows one of them."""
-    program, registers = table.program(row), table.state.registers[row]
+    program = table.program(row)
     if program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
         return {}
-    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    fields = _fields(table, row)
     present = {
         number: (int(entity[Field.X]), int(entity[Field.Y]))
         for number, entity in enumerate(fields)
@@ -158,11 +162,11 @@ def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
 
 def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int, int], Code]:
     """(x, y) -> what is in the hands of the member there: of NPCs its type and colour, where the agent sees them."""
-    program, registers = table.program(row), table.state.registers[row]
+    program = table.program(row)
     flags = program.header(Header.FLAGS)
     if not flags & Flag.CARRYING:
         return {}
-    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    fields = _fields(table, row)
     shown = flags & Flag.SHOWS_CARRYING and not flags & Flag.NPCS_HIDDEN
     found: dict[tuple[int, int], Code] = {}
     for number, thing in enumerate(fields):
@@ -185,7 +189,7 @@ def _marks(
     program, registers = table.program(row), table.state.registers[row]
     if not program.looks:
         return {}
-    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    fields = _fields(table, row)
     words, found = dict(program.looks), dict[tuple[int, int], Marks]()
     roles = [entity.role for entity in program.entities]
     things = [number for number, role in enumerate(roles) if role == "object"]
@@ -205,10 +209,8 @@ def _marks(
 
 def _look(program: Program, number: int, entity: NDArray[np.int16]) -> Code:
     """How an object looks in its status."""
-    entities, types = program.header(Header.ENTITY_AT), program.header(Header.TYPE_AT)
-    kind = int(program.words[entities + EntityColumn.COLUMNS * number + EntityColumn.TYPE])
-    first = types + TypeColumn.COLUMNS * (kind + int(entity[Field.STATUS]))
-    look = program.words[first : first + TypeColumn.COLUMNS]
+    first = program.table(Header.ENTITY_AT)[number, EntityColumn.TYPE]
+    look = program.table(Header.TYPE_AT)[first + entity[Field.STATUS]]
     return (
         int(look[TypeColumn.CODE]),
         int(entity[Field.COLOR]),

@@ -9,13 +9,14 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.explain import Recording
+from socialai_dsl.envs.explain import Explainer, Recording
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
 from socialai_dsl.envs.table import Table
-from socialai_dsl.program import EntityName, Register
+from socialai_dsl.envs.view import View
+from socialai_dsl.program import FIRST_ENTITY, EntityName, Field, Flag, Header, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, words_of_looks
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
@@ -87,8 +88,7 @@ def _index(given: Any, words: Sequence[str], what: str, live: frozenset[int] = f
     if isinstance(given, str):
         if given in words:
             return min((i for i in live if words[i] == given), default=words.index(given))
-        near = did_you_mean(given, words)
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = suggested(given, words, quoted=repr)
         raise ValueError(f"got the {what} {given!r}; expected one of {', '.join(map(repr, words))}{hint}")
     if isinstance(given, int | np.integer) and not isinstance(given, bool) and 0 <= given < len(words):
         return int(given)
@@ -109,8 +109,7 @@ def _sentence(given: Any, sentences: Sentences, live: Live) -> tuple[int, ...]:
     if isinstance(given, str):
         if given in texts:
             return texts[given]
-        near = did_you_mean(given, texts)
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = suggested(given, texts, quoted=repr)
         raise ValueError(f"got the sentence {given!r}, which the grammar cannot say{hint}")
     raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(texts))!r}")
 
@@ -143,6 +142,9 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     `socialai_dsl.make` makes one from a name.
 
+    Attributes:
+        program: the scenario or suite. playing: the program of this episode: of a suite the member's.
+
     Args:
         program: what `socialai_dsl.compile` returns, for a scenario or a suite.
         render_mode: `rgb_array`, `ansi`, or `human`, which prints the room after every step.
@@ -162,7 +164,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {modes}")
         self.program = program
         self.render_mode = render_mode
-        self._table = Table([program], 1, 1)
+        self._table = Table([program], 1)
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
         self._shape = self.action_space.nvec.shape
@@ -180,11 +182,11 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._history = ""
         self._ended = True
         self._act = 0
-        self._playing = self._table.program(0)
+        self.playing = self._table.program(0)
         self._always: dict[str, Any] = {}
-        self._recording = Recording.of(self._table, 0)
+        self._recording = Recording(self._table.start(0))
         self._last_act: Recording | None = None
-        self._explainers: dict[str, Any] = {}
+        self._explainers: dict[str, Explainer] = {}
         self._scenarios = tuple(scenarios)
 
     def reset(
@@ -261,7 +263,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             outcome = self._numbers[Register.OUTCOME]
             info |= {
                 "success": self._success[0],
-                "outcome": self._playing.outcomes[outcome],
+                "outcome": self.playing.outcomes[outcome],
             }
         if self.render_mode == "human":
             self.render()
@@ -269,21 +271,21 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _record(self) -> None:
         """Remember from here on what is done."""
-        self._recording, self._last_act = Recording.of(self._table, 0), None
+        self._recording, self._last_act = Recording(self._table.start(0)), None
 
     def _turn_over(self) -> None:
         """Begin anew where another act has begun."""
         if self._key[Key.ACT] == self._act:
             self._last_act = None
         else:
-            self._last_act, self._recording = self._recording, Recording.of(self._table, 0)
+            self._last_act, self._recording = self._recording, Recording(self._table.start(0))
             self._look_up()
             self._history = "\n".join(self._table.history(0))
 
     def _look_up(self) -> None:
         """Look up which program this episode plays."""
         self._act = self._key[Key.ACT]
-        self._playing = self._table.program(0)
+        self.playing = self._table.program(0)
         self._always = {"member": self._table.member(0)} if self._suite else {}
 
     def _converted(self, action: Any, given: NDArray[Any]) -> NDArray[np.int64]:
@@ -362,16 +364,13 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             raise ValueError("explain: got a call before the first step; expected step() first")
         number = self._table.number_at(int(recording.start.key[Key.PROGRAM]))
         program = self._table.programs[number]
-        from socialai_dsl.envs.explain import Explainer  # the compiler is needed for this alone
-
         scenario = self._scenario(number)
         if program.sha256 not in self._explainers:
             suite = self.program if isinstance(self.program, ProgramSuite) else None
             self._explainers[program.sha256] = Explainer(program, scenario, suite, number)
         # Where another act has begun, the registers are that one's.
         reached = self._registers if self._last_act is None else None
-        explained: dict[str, Any] = self._explainers[program.sha256].explain(recording, reached)
-        return explained
+        return self._explainers[program.sha256].explain(recording, reached)
 
     def snapshot(self) -> bytes:
         """The exact state as bytes, randomness included."""
@@ -427,6 +426,12 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def coloured_text(self) -> str:
         """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""
         return coloured_text(self._table, 0)
+
+    def view(self, image: NDArray[np.uint8]) -> View:
+        """The image of the present observation as a player sees it."""
+        facing = int(self._registers[FIRST_ENTITY + Field.DIR])
+        egocentric = bool(self.playing.header(Header.FLAGS) & Flag.EGOCENTRIC)
+        return View(image, facing, egocentric, self.channels, self.looks)
 
     def scene(self) -> Scene:
         """The content of a picture of the room now."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,10 @@ from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.describe import describe, history
-from socialai_dsl.envs.layout import pinned_member, pins_of
+from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.envs.merge import CommonSpace
 from socialai_dsl.envs.starts import Starts
+from socialai_dsl.envs.values import word
 from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 
@@ -116,6 +117,14 @@ def _numbers_of_texts(lines: Sequence[str]) -> NDArray[np.uint64]:
     return np.array([first[text] for text in lines], np.uint64)
 
 
+class Start(NamedTuple):
+    """A moment of an environment: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
+
+    registers: NDArray[np.int16]
+    board: NDArray[np.uint32]
+    key: NDArray[np.uint64]
+
+
 class Table:
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
@@ -123,9 +132,7 @@ class Table:
         image: uint8 (E, 7, 7, channels), tokens: int16 (E, L): buffers that every call writes to.
     """
 
-    def __init__(self, playables: Sequence[Playable], rows: int, threads: int = 1) -> None:
-        if threads != 1:
-            raise ValueError(f"num_threads: got {threads}; expected 1: to use more cores run more processes")
+    def __init__(self, playables: Sequence[Playable], rows: int) -> None:
         different = list({id(playable): playable for playable in playables}.values())
         self.merged = CommonSpace.of(different)
         self.programs = self.merged.programs
@@ -158,12 +165,13 @@ class Table:
     # --- playing ---
 
     def reset(self, seed: Any, options: Mapping[str, Any] | None) -> None:
-        """Start episodes; see `seats.choose_episodes` for the meaning of seeds, `layout.pins_of` for layouts."""
+        """Start episodes; see `choose_episodes` for the meaning of seeds, `layout.pins_of` for layouts."""
         given = check_options(options)
         chosen = self._mask(given.get("reset_mask"))
         keys = self.state.keys.copy()
         choose_episodes(keys, chosen, seed, given, self.fresh)
-        pins, rows = self._pins(given.get("layout"), keys, chosen)
+        layout: Any = given.get("layout")
+        pins, rows = self._pins(layout, keys, chosen)
         # Nothing has changed so far, should something be wrong with what was given.
         self.state.keys[:] = keys
         self.fresh = False
@@ -171,9 +179,12 @@ class Table:
         ports.chosen[:] = chosen
         ports.layout[:] = rows
         self.batch.reset(pins)
-        layout = given.get("layout")
         for row in np.flatnonzero(chosen & (rows != 0)).tolist():
-            self.state.keys[row, Key.SPOILED] = self._is_spoiled(layout, row)
+            own = layout if isinstance(layout, Mapping) else layout[row]
+            # Whether the layout is of an act after one that was no success.
+            self.state.keys[row, Key.SPOILED] = self._plays_acts[self.pool_of[row]] and bool(
+                own.get("spoiled")
+            )
         if self._starts:
             self._begin(chosen & (rows == 0))
 
@@ -202,12 +213,11 @@ class Table:
 
     def play(self, task: Task, actions: NDArray[np.integer[Any]] | None = None) -> int:
         """`Batch.step`, after which episodes that begin are where their members begin."""
-        if self._starts:
-            episodes = self.state.keys[:, Key.EPISODE].copy()
-            ended = self.batch.step(task, actions)
-            self._begin(self.state.keys[:, Key.EPISODE] != episodes)
-        else:
-            ended = self.batch.step(task, actions)
+        if not self._starts:
+            return self.batch.step(task, actions)
+        episodes = self.state.keys[:, Key.EPISODE].copy()
+        ended = self.batch.step(task, actions)
+        self._begin(self.state.keys[:, Key.EPISODE] != episodes)
         return ended
 
     def _begin(self, fresh: NDArray[np.bool_]) -> None:
@@ -266,22 +276,13 @@ class Table:
             return 0
         named = layout.get("member") if isinstance(layout, Mapping) else None
         if named is not None:
-            return pinned_member(named, members)
+            return word("member", named, members)
         if self._plays_acts[pool]:
             return 0
         seed, index, episode = (int(key[word]) for word in (Key.SEED, Key.INDEX, Key.EPISODE))
         summed = np.cumsum(self.batch.weights(pool))
         drawn = below(draw(episode_key(seed, index, episode), site("member"), 0, 0), int(summed[-1]))
         return int(np.searchsorted(summed, drawn, side="right"))
-
-    def _is_spoiled(self, layout: Any, row: int) -> bool:
-        """Whether a layout says that an act before the one it is for was no success."""
-        own = layout if isinstance(layout, Mapping) else layout[row] if layout is not None else None
-        return (
-            bool(own.get("spoiled"))
-            if own is not None and self._plays_acts[self.pool_of.item(row)]
-            else False
-        )
 
     def set_member_weights(self, weights: Sequence[int]) -> None:
         """Let later episodes draw the suite's members as they weigh.
@@ -307,6 +308,20 @@ class Table:
         return self.batch.ports.actions.copy()
 
     # --- looking ---
+
+    def start(self, row: int) -> Start:
+        """The moment at which a row is, copied."""
+        state = self.state
+        return Start(state.registers[row].copy(), state.boards[row].copy(), state.keys[row].copy())
+
+    def own_keys(self, keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
+        """Keys of another batch that plays the first row's program, uint64 (..., Key.WORDS), as keys of this one.
+
+        Each batch names programs by their place in it.
+        """
+        keys, named = keys.copy(), [Key.PROGRAM, Key.POOL]
+        keys[..., named] = self.state.keys[0, named]
+        return keys
 
     def number(self, row: int) -> int:
         """Which program a row plays in this episode."""

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName, place_of
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
@@ -169,8 +169,8 @@ def utterance_number(program: Program, given: Any, key: str) -> int:
     if isinstance(given, str):
         pair = _pair_of(program, given)
         if pair is None:
-            near = did_you_mean(given, (program.sentences.text(*one) for one in program.sentences.each()))
-            hint = f"; did you mean {near!r}?" if near else ""
+            sayable = (program.sentences.text(*one) for one in program.sentences.each())
+            hint = suggested(given, sayable, quoted=repr)
             raise ValueError(f"{key}: got {given!r}, which the grammar cannot say{hint}")
     elif isinstance(given, Sequence) and len(given) == 2:
         pair = (
@@ -202,21 +202,20 @@ def word(key: str, value: Any, words: Sequence[Any]) -> int:
 def meant(given: str, among: Any) -> str:
     """A suggestion for a name that does not exist, to be added to a message."""
     known = list(among)
-    near = did_you_mean(given, known)
-    return f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(sorted(known))}"
+    return suggested(given, known, f"; expected one of {', '.join(sorted(known))}", repr)
 
 
-def cell_pair(key: str, given: Any) -> tuple[Any, Any]:
-    """The two parts of [x, y]."""
-    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
-        raise ValueError(f"{key}: got {given!r}; expected [x, y]")
-    return given[0], given[1]
+def parts_of(key: str, given: Any, count: int, form: str) -> Sequence[Any]:
+    """The parts of a list of a form, such as [x, y]. Raises ValueError that names the key for anything else."""
+    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != count:
+        raise ValueError(f"{key}: got {given!r}; expected {form}")
+    return given
 
 
 def _cell(program: Program, given: Any, key: str) -> int:
     if given == NOWHERE and isinstance(given, str):
         return CELL - 1
-    x, y = cell_pair(key, given)
+    x, y = parts_of(key, given, 2, "[x, y]")
     across = whole_number(f"{key}[0]", x, 0, program.header(Header.CANVAS_WIDTH) - 1)
     return CELL + 32 * whole_number(f"{key}[1]", y, 0, program.header(Header.CANVAS_HEIGHT) - 1) + across
 

@@ -73,6 +73,10 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         for what, number in (("num_envs", num_envs), ("num_threads", num_threads)):
             if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
                 raise ValueError(f"{what}: got {number!r}; expected a whole number, at least 1")
+        if num_threads != 1:
+            raise ValueError(
+                f"num_threads: got {num_threads}; expected 1: to use more cores run more processes"
+            )
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else str(autoreset_mode)
         if mode.lower() not in _MODES:
             raise ValueError(
@@ -87,7 +91,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
             "render_fps": 4,
         }
         self._task = _TASKS[self.autoreset_mode]
-        self._table = Table(playables, int(num_envs), int(num_threads))
+        self._table = Table(playables, int(num_envs))
         self._copy = copy
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
@@ -109,7 +113,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     @property
     def outcomes(self) -> list[str]:
         """The names that `infos["outcome"]` indexes, equal to `program.outcomes`."""
-        return [name for name, _ in self._table.merged.outcomes]
+        return self.program.outcomes
 
     @property
     def vocabulary(self) -> tuple[str, ...]:

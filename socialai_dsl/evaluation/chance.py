@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
 
 _TOGETHER: Final = 1000
 
@@ -50,10 +51,6 @@ def play_at_random(scenario: str, episodes: int, seed: int) -> Sample:
         episodes: how many at least; rounded up to a multiple of the number of environments.
         seed: of the environments and of the policy.
     """
-    import numpy as np
-
-    import socialai_dsl
-
     count = min(_TOGETHER, episodes)
     envs: Any = socialai_dsl.make_vec(scenario, num_envs=count, copy=False, autoreset_mode="SameStep")
     generator = np.random.default_rng(seed)
@@ -76,8 +73,6 @@ class _Tally:
     """Counts the first `each` episodes of each of E environments."""
 
     def __init__(self, environments: int, each: int) -> None:
-        import numpy as np
-
         self._each = each
         self._played = np.zeros(environments, np.int64)
         self._length = np.zeros(environments, np.int64)
@@ -89,9 +84,7 @@ class _Tally:
         """Whether every environment has played its episodes."""
         return bool((self._played >= self._each).all())
 
-    def note(
-        self, reward: "NDArray[np.float64]", ended: "NDArray[np.bool_]", success: "NDArray[np.bool_]"
-    ) -> None:
+    def note(self, reward: NDArray[np.float64], ended: NDArray[np.bool_], success: NDArray[np.bool_]) -> None:
         """Note one step of all environments, arrays (E,)."""
         self._length += 1
         self._return += reward

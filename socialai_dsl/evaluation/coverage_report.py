@@ -6,19 +6,18 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import numpy as np
+
+import socialai_dsl
+from socialai_dsl.analysis.effort import Clock
+from socialai_dsl.analysis.tally import Tally, TallyItem, parts_of, tally
+from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.evaluation.scripts import scripted_name, with_script
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl.analysis.effort import Clock
-    from socialai_dsl.analysis.tally import Tally, TallyItem
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")
@@ -45,8 +44,6 @@ def coverage(
         ScenarioError: a scenario has mistakes.
         UsageError: an agent cannot play a scenario.
     """
-    from socialai_dsl.analysis.effort import Clock
-
     whole, found = Clock() if clock is None else clock, Coverage()
     with whole.until_interrupted():
         plays = []
@@ -78,32 +75,15 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 def _parts(scenario: str) -> list[TallyItem]:
     """Everything in a scenario that can come about."""
-    from socialai_dsl.analysis.tally import parts_of
-    from socialai_dsl.checking.loaded import LoadedSuite
-    from socialai_dsl.frontend import load
-
-    loaded = load(scenario)
-    members = loaded.members if isinstance(loaded, LoadedSuite) else (loaded,)
-    return [part for member in members for part in parts_of(member.checked)]
+    return [part for checked in scenarios_of(socialai_dsl.load(scenario)) for part in parts_of(checked)]
 
 
 def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -> Tally:
-    import numpy as np
-
-    import socialai_dsl
-    from socialai_dsl.analysis.tally import tally
-    from socialai_dsl.compilation import scenarios_of
-    from socialai_dsl.frontend import load
-
-    played = scenarios_of(load(scenario))
+    played = scenarios_of(socialai_dsl.load(scenario))
     envs: Any = socialai_dsl.make_vec(
         scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled"
     )
     try:
-        if agent == "oracle":
-            return tally(
-                envs, played, lambda seen: envs.scripted_actions(), _forget_nothing, episodes, seed, clock
-            )
         if agent == "random":
             generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
             shape = (envs.num_envs, len(sizes))
@@ -111,12 +91,13 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
                 envs,
                 played,
                 lambda seen: generator.integers(0, sizes, shape),
-                _forget_nothing,
+                lambda rows, numbers: None,
                 episodes,
                 seed,
                 clock,
             )
-        require_trainer()
+        if agent != "oracle":
+            require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
             warnings.warn(warning, stacklevel=2)
@@ -125,10 +106,6 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
         raise UsageError(str(error)) from error
     finally:
         envs.close()
-
-
-def _forget_nothing(rows: NDArray[np.bool_], episodes: NDArray[np.int64]) -> None:
-    """An agent without a memory."""
 
 
 @dataclass

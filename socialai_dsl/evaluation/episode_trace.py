@@ -5,16 +5,21 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
+from socialai_dsl import replay
+from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.errors import UsageError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl import replay
+from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.scripts import with_script
+from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.replay.endings import endings_of
+from socialai_dsl.replay.state import cast_of, changes
 
 
 @dataclass
@@ -146,10 +151,6 @@ class EpisodeTracer:
     """
 
     def __init__(self, scenario: str, agent: str | None, lines: Sequence[str] | None, seed: int) -> None:
-        import socialai_dsl
-        from socialai_dsl.evaluation.players import named_agent
-        from socialai_dsl.evaluation.scripts import with_script
-
         self.agent = "typed" if agent is None else named_agent(agent, scenario)
         self._asked, self._lines, self._seed = scenario, lines, seed
         if lines is None and agent in (None, "oracle"):
@@ -178,20 +179,15 @@ class EpisodeTracer:
             self._observation, info = env.reset(**reset)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        options = reset["options"] or {}
-        origin = _origin(reset.get("seed"), options)
-        member, cast = info.get("member"), self._cast(info)
+        member, cast = info.get("member"), cast_of(env.playing)
         return Trace(
-            *(self.scenario, self.agent, origin, member, cast, self._names()),
+            *(self.scenario, self.agent, _origin(reset), member, cast, self._names()),
             picture=env.plain_text(),
             state=env.describe(),
         )
 
     def steps(self, trace: Trace) -> Iterator[TraceStep]:
         """Play on to the end, or as far as there is something typed."""
-        from socialai_dsl.program_suite import outcome_name
-        from socialai_dsl.replay.state import changes
-
         env, before = self._env.unwrapped, trace.state
         while trace.outcome is None:
             action = self._act(self._observation)
@@ -212,7 +208,7 @@ class EpisodeTracer:
                 () if info["utterance"] == "NA" else tuple(info["utterance"].splitlines()),
                 env.plain_text(),
                 after,
-                self._cast(info),
+                cast_of(env.playing),
                 changes(before, after),
                 explained["fired"],
                 explained["others"],
@@ -220,23 +216,18 @@ class EpisodeTracer:
             )
             before = after
 
-    def document(self) -> "replay.Trace":
+    def document(self) -> replay.Trace:
         """What was played so far, in the format of replays: played again, without the script."""
-        import socialai_dsl
-        from socialai_dsl.checking.loaded import about_of
-        from socialai_dsl.replay import trace_of
-        from socialai_dsl.replay.endings import endings_of
-
         loaded = socialai_dsl.load(self._asked)
         env: Any = socialai_dsl.make(self._asked)
         try:
-            return trace_of(
+            return replay.trace_of(
                 env,
                 self._actions,
                 self._reset,
                 scenario=self._asked,
                 agent=self.agent,
-                episode=_origin(self._reset.get("seed"), self._reset["options"] or {}),
+                episode=_origin(self._reset),
                 endings={one.name: one.text for one in endings_of(loaded, env.unwrapped.program)},
                 about=about_of(loaded),
             )
@@ -247,24 +238,14 @@ class EpisodeTracer:
         """Let the environment go."""
         self._env.close()
 
-    def _cast(self, info: dict[str, Any]) -> tuple[str, ...]:
-        """The agent and the NPCs of what is played."""
-        from socialai_dsl.replay.state import cast_of, played
-
-        return cast_of(played(self._env.unwrapped.program, info))
-
     def _names(self) -> tuple[str, ...]:
         """The same of everything that may be played."""
-        from socialai_dsl.replay.state import cast_of
-
         program = self._env.unwrapped.program
         programs = getattr(program, "programs", (program,))
         return tuple(dict.fromkeys(name for one in programs for name in cast_of(one)))
 
-    def _actor(self) -> "Callable[[Any], NDArray[np.int64] | None]":
+    def _actor(self) -> Callable[[Any], NDArray[np.int64] | None]:
         """What chooses an action for an observation; None at the end of what was typed."""
-        import numpy as np
-
         env = self._env.unwrapped
         if self._lines is not None:
             typed = iter([self._typed(line) for line in self._lines])
@@ -278,7 +259,7 @@ class EpisodeTracer:
         policy.reset(np.ones(1, np.bool_))
         return lambda observation: policy.act(observation)
 
-    def _typed(self, line: str) -> "NDArray[np.int64]":
+    def _typed(self, line: str) -> NDArray[np.int64]:
         env = self._env.unwrapped
         phrases = Phrases(env.program.actions, env.program.sentences)
         try:
@@ -288,8 +269,6 @@ class EpisodeTracer:
         return action
 
     def _policy(self) -> Any:
-        from socialai_dsl.evaluation.players import Player, make_policy, require_trainer
-
         require_trainer()
         try:
             policy, told = make_policy(Player(self.agent, seed=self._seed), self._env)
@@ -300,12 +279,13 @@ class EpisodeTracer:
         return policy
 
 
-def _origin(seed: int | None, options: dict[str, Any]) -> str:
+def _origin(reset: dict[str, Any]) -> str:
     """Which episode it is, in words."""
+    options = reset["options"] or {}
     if "test_episode" in options:
         return f"test episode {options['test_episode']}"
     room = f", room {options['index']}" if "index" in options else ""
-    return f"seed {seed}{room}"
+    return f"seed {reset['seed']}{room}"
 
 
 def is_among(who: str, names: Sequence[str]) -> bool:

@@ -6,14 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import socialai_dsl
 from socialai_dsl.atomic import write_json, write_text
+from socialai_dsl.checking.loaded import Loaded, about_of
+from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.model_card import model_card
+from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.loader.resolved import name_source, parse_name
 from socialai_dsl.run_folder import RESULT, SETTINGS, read_config
+from trainer.config import RunConfig, code_folder
+from trainer.shipped import WEIGHTS
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded
     from trainer.checkpoint import Checkpoint
-    from trainer.config import RunConfig
 
 CARD: Final = "README.md"
 VOCABULARY: Final = "vocabulary.json"
@@ -26,7 +32,6 @@ def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
     Raises:
         UsageError: it is not such a folder, it is not finished, or its agent was not trained.
     """
-    import socialai_dsl
     from trainer import checkpoint as checkpoints
     from trainer.errors import CheckpointError
 
@@ -46,8 +51,8 @@ def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
 
 def write_agent(
     out: Path,
-    config: "RunConfig",
-    loaded: "Loaded",
+    config: RunConfig,
+    loaded: Loaded,
     checkpoint: "Checkpoint",
     result: Mapping[str, Any],
     agent: str = ".",
@@ -62,11 +67,7 @@ def write_agent(
         result: content of the run's `result.json`.
         agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
     """
-    from socialai_dsl.checking.loaded import about_of
-    from socialai_dsl.evaluation.model_card import model_card
     from trainer import checkpoint as checkpoints
-    from trainer.config import code_folder
-    from trainer.shipped import WEIGHTS
 
     moved = MovedScenario.of(loaded, config.scenario)
     moved.copy(out)
@@ -108,16 +109,12 @@ class MovedScenario:
     names: Mapping[str, str]
 
     @classmethod
-    def of(cls, loaded: "Loaded", spec: str) -> "MovedScenario":
+    def of(cls, loaded: Loaded, spec: str) -> "MovedScenario":
         """The files of a scenario that was named `spec`.
 
         Raises:
             UsageError: one lies outside the scenario's folder and what ships.
         """
-        from socialai_dsl.diagnostics import DiagnosticBag
-        from socialai_dsl.loader.reader import shipped_folder
-        from socialai_dsl.loader.resolved import name_source, parse_name
-
         source = name_source(spec)
         start = source.span(0, 1)
         base = parse_name(spec, start, DiagnosticBag(), Path.cwd()).base.text

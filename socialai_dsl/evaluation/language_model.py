@@ -4,27 +4,30 @@ import os
 import re
 import sys
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.envs.asking import Asker, probe_names
 from socialai_dsl.errors import RunFailed, UsageError
+from socialai_dsl.evaluation.episodes import EvalResult
 from socialai_dsl.evaluation.players import MODEL_PREFIX, ModelOptions
+from socialai_dsl.llm.episode import INVALID
+from socialai_dsl.llm.questions import score
+from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import Ending
 from socialai_dsl.run_folder import scenario_folder_name
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl.checking.loaded import Loaded
-    from socialai_dsl.evaluation.episodes import EvalResult
+if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
+    from socialai_dsl.llm.endpoint import Endpoint
     from socialai_dsl.llm.players import Budget, PlayedEpisode
-    from socialai_dsl.program_suite import Playable
 
 TRANSCRIPTS: Final = "transcripts"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
@@ -42,8 +45,8 @@ class ModelEpisodes:
         endings: further ways in which episodes ended. figures: further ones.
     """
 
-    result: "EvalResult"
-    actions: "dict[int, list[NDArray[np.int64]]]"
+    result: EvalResult
+    actions: dict[int, list[NDArray[np.int64]]]
     replies: dict[int, list[list[tuple[str, str]]]]
     endings: list[Ending]
     figures: dict[str, Any]
@@ -52,12 +55,12 @@ class ModelEpisodes:
 def let_a_model_play(
     agent: str,
     scenario: str,
-    loaded: "Loaded",
-    program: "Playable",
+    loaded: Loaded,
+    program: Playable,
     episodes: int,
     out: Path,
     options: ModelOptions,
-) -> "ModelEpisodes":
+) -> ModelEpisodes:
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
     Args:
@@ -75,20 +78,11 @@ def let_a_model_play(
     """
     if find_spec("httpx") is None:
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
-    from socialai_dsl.envs.asking import Asker, probe_names
-    from socialai_dsl.llm.endpoint import Endpoint, EndpointError
+    from socialai_dsl.llm.endpoint import EndpointError
     from socialai_dsl.llm.players import LanguageModelPlayer, Manner, OtherSettings, transcripts
 
-    endpoint = _endpoint(Endpoint, agent, options)
-    manner = Manner(
-        options.style,
-        options.mode,
-        options.on_invalid,
-        options.goal,
-        options.history,
-        options.grammar,
-        options.probes,
-    )
+    endpoint = _endpoint(agent, options)
+    manner = Manner(**{field.name: getattr(options, field.name) for field in fields(Manner)})
     names = probe_names(loaded) if manner.probes != "off" else ()
     budget = _budget(options.budget, endpoint.prices)
     settings = {
@@ -119,7 +113,7 @@ def let_a_model_play(
     return _outcome(played, program, _probes(played, names))
 
 
-def episodes_of_model(run: Path, program: "Playable", most: int) -> "ModelEpisodes":
+def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:
     """The results of the first episodes of a model, from their transcripts in the folder `run`.
 
     Raises:
@@ -136,8 +130,8 @@ def episodes_of_model(run: Path, program: "Playable", most: int) -> "ModelEpisod
     return _outcome(played, program)
 
 
-def _endpoint(kind: Any, agent: str, options: ModelOptions) -> Any:
-    from socialai_dsl.llm.endpoint import OPENAI
+def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
+    from socialai_dsl.llm.endpoint import OPENAI, Endpoint
 
     url = options.base_url or OPENAI
     parts = urlsplit(url)
@@ -155,7 +149,7 @@ def _endpoint(kind: Any, agent: str, options: ModelOptions) -> Any:
     if not model:
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
-    return kind(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
+    return Endpoint(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
 
 
 def _prices(text: str | None) -> tuple[float, float] | None:
@@ -187,13 +181,8 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
 
 
 def _outcome(
-    played: "Sequence[PlayedEpisode]", program: "Playable", probes: dict[str, Any] | None = None
-) -> "ModelEpisodes":
-    import numpy as np
-
-    from socialai_dsl.evaluation.episodes import EvalResult
-    from socialai_dsl.llm.episode import INVALID
-
+    played: "Sequence[PlayedEpisode]", program: Playable, probes: dict[str, Any] | None = None
+) -> ModelEpisodes:
     results = [episode.result for episode in played]
     invalid = any(result.ending == INVALID for result in results)
     names = [*program.outcomes, *([INVALID] if invalid else [])]
@@ -232,10 +221,8 @@ def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:
     }
 
 
-def _probes(played: "Sequence[PlayedEpisode]", names: "Sequence[str]") -> dict[str, Any]:
+def _probes(played: "Sequence[PlayedEpisode]", names: Sequence[str]) -> dict[str, Any]:
     """How each probe was answered; nothing if the scenario has none, or they were not asked."""
-    from socialai_dsl.llm.questions import score
-
     answered = [one for episode in played for one in episode.answered]
     scores = {name: score(one for one in answered if one.question.probe == name) for name in names}
     return {"probes": {name: vars(found) for name, found in scores.items()}} if names else {}

@@ -9,6 +9,8 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 import socialai_dsl
+from socialai_dsl.analysis.depth import without_npcs
+from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.atomic import write_json
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.diagnostics import ScenarioError
@@ -85,9 +87,6 @@ def _played(scenario: str, agent: str, episodes: int) -> Level:
 
 
 def _alone(loaded: socialai_dsl.LoadedScenario | socialai_dsl.LoadedSuite, rooms: int) -> Level | None:
-    from socialai_dsl.analysis.depth import without_npcs
-    from socialai_dsl.analysis.effort import Effort
-
     if isinstance(loaded, socialai_dsl.LoadedSuite):
         return None
     alone = without_npcs(loaded, Effort(rooms=rooms))

@@ -5,13 +5,13 @@ import warnings
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
+import socialai_dsl
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.episodes import Policy, RandomPolicy, ScriptedPolicy
+from socialai_dsl.loader.reader import shipped_folder
 from trainer.shipped import PREFIX, located, shipped_agents
-
-if TYPE_CHECKING:
-    from socialai_dsl.evaluation.episodes import Policy
 
 MODEL_PREFIX: Final = "llm:"
 
@@ -92,14 +92,12 @@ class Player:
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
 
 
-def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
+def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
     """What plays, and what is to be known about it, such as that it was trained on something else.
 
     Raises:
         ValueError: the checkpoint does not fit the environments.
     """
-    from socialai_dsl.evaluation.episodes import RandomPolicy, ScriptedPolicy
-
     if player.agent == "random":
         return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
     if player.agent == "oracle":
@@ -159,9 +157,6 @@ def named_agent(agent: str, scenario: str) -> str:
         ScenarioError: the scenario has mistakes.
         UsageError: none ships for it.
     """
-    import socialai_dsl
-    from socialai_dsl.loader.reader import shipped_folder
-
     if agent != "shipped":
         return agent
     path, shipped = socialai_dsl.load(scenario).resolved.path, shipped_folder().resolve()

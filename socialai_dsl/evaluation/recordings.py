@@ -5,6 +5,7 @@ import io
 from pathlib import Path
 
 from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.replay.page import replay_page
 from socialai_dsl.run_folder import EPISODES, REPLAY, scenario_folder_name, write_text
 
 
@@ -20,8 +21,6 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
     Raises:
         OSError: a file cannot be written.
     """
-    from socialai_dsl.replay.page import replay_page
-
     place = folder / scenario_folder_name(evaluation.scenario)
     place.mkdir(parents=True, exist_ok=True)
     for success in (False, True):

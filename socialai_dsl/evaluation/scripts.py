@@ -3,16 +3,16 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
+from socialai_dsl.analysis.effort import Clock
+from socialai_dsl.analysis.search import Finding, search_rooms
+from socialai_dsl.checking.loaded import unscripted
 from socialai_dsl.errors import UsageError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl.analysis.effort import Clock
-    from socialai_dsl.analysis.search import Finding
 
 _TOGETHER: Final = 250
 _ROOMS_SHOWN: Final = 12
@@ -51,9 +51,6 @@ def with_script(scenario: str) -> str:
 
 def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
     """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
-    import socialai_dsl
-    from socialai_dsl.checking.loaded import unscripted
-
     lacking = unscripted(socialai_dsl.load(scenario))
     if not lacking:
         return scenario, ()
@@ -171,7 +168,7 @@ def _indices(rooms: Sequence[UnsolvedRoom]) -> str:
 
 
 def play_script(
-    scenario: str, rooms: int, seed: int, states: int, clock: "Clock | None" = None
+    scenario: str, rooms: int, seed: int, states: int, clock: Clock | None = None
 ) -> ScriptReport:
     """Let the script play, then search every room that it left unsolved.
 
@@ -186,10 +183,6 @@ def play_script(
     Raises:
         UsageError: there is no script.
     """
-    import numpy as np
-
-    from socialai_dsl.analysis.effort import Clock
-
     scripted, whole = with_script(scenario), Clock() if clock is None else clock
     played = _Played(np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64), [""] * rooms)
     findings: list[Finding] = []
@@ -227,8 +220,8 @@ def play_script(
 class _Played:
     """How the script's episodes ended, of rooms 0 to `rooms` - 1: (planned,) each."""
 
-    success: "NDArray[np.bool_]"
-    lengths: "NDArray[np.int64]"
+    success: NDArray[np.bool_]
+    lengths: NDArray[np.int64]
     outcomes: list[str]
     rooms: int = 0
 
@@ -238,12 +231,8 @@ class _Played:
         return [room for room in range(self.rooms) if not self.success[room]]
 
 
-def _play(scripted: str, played: _Played, seed: int, clock: "Clock") -> None:
+def _play(scripted: str, played: _Played, seed: int, clock: Clock) -> None:
     """Play one episode in each room. Rooms are played together and count together, so that no length is favoured."""
-    import numpy as np
-
-    import socialai_dsl
-
     rooms = len(played.outcomes)
     count = min(rooms, _TOGETHER)
     envs: Any = socialai_dsl.make_vec(scripted, num_envs=count, copy=False, autoreset_mode="Disabled")
@@ -269,11 +258,8 @@ def _play(scripted: str, played: _Played, seed: int, clock: "Clock") -> None:
         envs.close()
 
 
-def _search(scenario: str, indices: list[int], seed: int, states: int, clock: "Clock") -> "Iterator[Finding]":
+def _search(scenario: str, indices: list[int], seed: int, states: int, clock: Clock) -> Iterator[Finding]:
     """What is found of these rooms, one after the other, until the clock is over."""
-    import socialai_dsl
-    from socialai_dsl.analysis.search import search_rooms
-
     if not indices or clock.is_over:
         return
     envs = socialai_dsl.make_vec(scenario, num_envs=len(indices))

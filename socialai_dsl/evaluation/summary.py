@@ -15,9 +15,10 @@ Row = tuple[str, str]
 def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     """Success with its interval, of each member of a suite as well, then mean length and return."""
     low, high = figures["success_interval"]
+    manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
         ("success", f"{figures['success_rate']:.1%}, 95% interval {low:.1%} to {high:.1%} (Wilson)"),
-        ("episodes", f"{figures['episodes']} of the test set" + _comma(figures["actions"])),
+        ("episodes", f"{figures['episodes']} of the test set{manner}"),
         ("mean length", f"{figures['mean_length']:.1f} steps"),
         ("mean return", f"{figures['mean_return']:.3f}"),
     ]
@@ -92,10 +93,6 @@ def aligned(rows: Sequence[Row]) -> list[str]:
     """Two columns."""
     width = max(len(name) for name, _ in rows)
     return [f"{name:<{width}}  {value}" for name, value in rows]
-
-
-def _comma(text: str) -> str:
-    return f", {text}" if text else ""
 
 
 def _shortened(text: str) -> str:

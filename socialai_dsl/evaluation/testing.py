@@ -3,25 +3,28 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from socialai_dsl.checking.loaded import about_of
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
+from socialai_dsl.checking.loaded import Loaded, about_of
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.episodes import EvalResult, Policy, evaluate
+from socialai_dsl.evaluation.export import SCENARIO
+from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
 from socialai_dsl.evaluation.players import Player, folder_of, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.scripts import with_script
+from socialai_dsl.llm.episode import INVALID
+from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
+from socialai_dsl.replay import Thought, Trace, trace_of
+from socialai_dsl.replay.document import Outcome
 from socialai_dsl.replay.endings import Ending, endings_of
+from socialai_dsl.replay.film import RecordedEpisode, record
+from socialai_dsl.replay.tracing import Think
 from socialai_dsl.run_folder import SETTINGS, read_json
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl.checking.loaded import Loaded
-    from socialai_dsl.evaluation.episodes import EvalResult, Policy
-    from socialai_dsl.evaluation.language_model import ModelEpisodes
-    from socialai_dsl.program_suite import Playable
-    from socialai_dsl.replay import Trace
-    from socialai_dsl.replay.film import RecordedEpisode
-    from socialai_dsl.replay.tracing import Think
 
 # Test episodes played together: enough to be fast, and no result depends on it.
 _TOGETHER: Final = 125
@@ -44,11 +47,11 @@ class Evaluation:
 
     scenario: str
     about: str
-    program: "Playable"
+    program: Playable
     player: Player
-    result: "EvalResult"
+    result: EvalResult
     endings: Sequence[Ending]
-    actions: "Mapping[int, list[NDArray[np.int64]]]"
+    actions: Mapping[int, list[NDArray[np.int64]]]
     warnings: Sequence[str] = field(default_factory=tuple)
     more: Mapping[str, Any] = field(default_factory=dict)
     replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
@@ -87,20 +90,15 @@ class Evaluation:
 
     def is_cut_short(self, number: int) -> bool:
         """Whether an answer without an action ended the episode."""
-        from socialai_dsl.llm.episode import INVALID
-
         return bool(self.result.names[self.result.outcome[number]] == INVALID)
 
-    def record(self, number: int, label: str) -> "RecordedEpisode":
+    def record(self, number: int, label: str) -> RecordedEpisode:
         """Play one of the episodes once more, for people to look at.
 
         Args:
             number: of the test episode.
             label: how the recording calls the agent.
         """
-        import socialai_dsl
-        from socialai_dsl.replay.film import record
-
         env = socialai_dsl.make(self.program, render_mode="rgb_array")
         title = f"{self.scenario}, test episode {number}, {label}"
         endings = {ending.name: ending for ending in self.endings}
@@ -121,10 +119,8 @@ class Evaluation:
         """Numbers of up to `count` failures and as many successes."""
         return [number for success in (False, True) for number in self.pick(success, count)]
 
-    def traces(self, numbers: Iterable[int]) -> "list[Trace]":
+    def traces(self, numbers: Iterable[int]) -> list[Trace]:
         """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
-        import socialai_dsl
-
         env = socialai_dsl.make(self.scenario)
         try:
             policy = make_policy(self.player, env)[0] if self.player.is_trained else None
@@ -132,10 +128,7 @@ class Evaluation:
         finally:
             env.close()
 
-    def _trace(self, env: Any, policy: Any, number: int) -> "Trace":
-        from socialai_dsl.replay import trace_of
-        from socialai_dsl.replay.document import Outcome
-
+    def _trace(self, env: Any, policy: Any, number: int) -> Trace:
         endings = {one.name: one.text for one in self.endings}
         ending = self.result.names[self.result.outcome[number]]
         cut_short = Outcome(name=ending, success=False, text=endings[ending])
@@ -154,12 +147,8 @@ class Evaluation:
         )
 
 
-def _thinking(policy: Any, number: int) -> "Think":
+def _thinking(policy: Any, number: int) -> Think:
     """Asks a trained agent what it makes of each observation of an episode."""
-    import numpy as np
-
-    from socialai_dsl.replay import Thought
-
     policy.reset(np.ones(1, np.bool_), np.array([number]))
 
     def think(observation: Any) -> Thought:
@@ -185,9 +174,6 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
         RunFailed: a language model has spent its budget.
     """
     player = agent if isinstance(agent, Player) else Player(named_agent(agent, scenario))
-    import socialai_dsl
-    from socialai_dsl.envs.factory import compiled
-
     loaded = socialai_dsl.load(scenario)
     program = compiled(loaded)
     endings = endings_of(loaded, program)
@@ -195,16 +181,10 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
         result, actions = _let_a_person_play(scenario, program, episodes)
         return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions)
     if player.options is not None:
-        from socialai_dsl.evaluation.language_model import let_a_model_play
-
         played = let_a_model_play(
             player.agent, scenario, loaded, program, episodes, player.out, player.options
         )
         return _of_model(played, scenario, loaded, program, player)
-
-    from socialai_dsl.evaluation.episodes import evaluate
-    from socialai_dsl.evaluation.scripts import with_script
-
     if player.is_trained:
         require_trainer()
     envs = socialai_dsl.make_vec(
@@ -232,16 +212,13 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
         ScenarioError: the scenario has mistakes.
         UsageError: the folder holds no episodes of this scenario.
     """
-    import socialai_dsl
-    from socialai_dsl.evaluation.language_model import episodes_of_model
-
     loaded = socialai_dsl.load(scenario)
     program = socialai_dsl.compile(loaded)
     return _of_model(episodes_of_model(run, program, most), scenario, loaded, program, Player(agent, out=run))
 
 
 def _of_model(
-    played: "ModelEpisodes", scenario: str, loaded: "Loaded", program: "Playable", player: Player
+    played: ModelEpisodes, scenario: str, loaded: Loaded, program: Playable, player: Player
 ) -> Evaluation:
     return Evaluation(
         scenario,
@@ -263,18 +240,18 @@ class _Remembering:
         played: number of an episode -> its actions, and perhaps more from after its end.
     """
 
-    def __init__(self, policy: "Policy") -> None:
+    def __init__(self, policy: Policy) -> None:
         self._policy = policy
         self._numbers: list[int] = []
         self.played: dict[int, list[NDArray[np.int64]]] = {}
 
-    def reset(self, mask: "NDArray[np.bool_]", episodes: "NDArray[np.int64] | None" = None) -> None:
+    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
         """See `Policy.reset`."""
         assert episodes is not None, "internal: test episodes have numbers"
         self._numbers = episodes.tolist()
         self._policy.reset(mask, episodes)
 
-    def act(self, observation: Any) -> "NDArray[np.int64]":
+    def act(self, observation: Any) -> NDArray[np.int64]:
         """See `Policy.act`."""
         actions = self._policy.act(observation)
         for number, action in zip(self._numbers, actions.copy(), strict=True):
@@ -283,12 +260,9 @@ class _Remembering:
 
 
 def _let_a_person_play(
-    scenario: str, program: "Playable", episodes: int
-) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]]]":
+    scenario: str, program: Playable, episodes: int
+) -> tuple[EvalResult, dict[int, list[NDArray[np.int64]]]]:
     """Let a person play test episodes until they quit."""
-    import numpy as np
-
-    from socialai_dsl.evaluation.episodes import EvalResult
     from socialai_dsl.play import play
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
@@ -309,10 +283,8 @@ def _let_a_person_play(
     return result, {number: p.actions for number, p in enumerate(played)}
 
 
-def _by_member(program: "Playable", shares: Mapping[str, float]) -> dict[str, Any]:
+def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]:
     """Of a suite: how often each member was played, and how often with success; nothing for a scenario."""
-    from socialai_dsl.program_suite import ProgramSuite, prefixed
-
     if not isinstance(program, ProgramSuite):
         return {}
     successes = {outcome.name for outcome in program.outcome_table if outcome.success}
@@ -342,6 +314,4 @@ def own_scenario(agent: str) -> str:
 
 def _comes_along(run: Path, scenario: str) -> bool:
     """Whether the scenario's file lies in the folder itself, as in an exported one."""
-    from socialai_dsl.evaluation.export import SCENARIO
-
     return scenario.startswith(f"{SCENARIO}/") and (run / SCENARIO).is_dir()

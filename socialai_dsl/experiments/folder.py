@@ -8,7 +8,7 @@ import json
 import os
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
@@ -31,7 +31,6 @@ LOCK: Final = "worker.lock"
 """Locked by the one process that works on a run; the system unlocks it when that process dies, however it dies."""
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
-FINAL: Final[frozenset[State]] = frozenset({"done", "failed", "cancelled"})
 
 _BLOCK: Final = 4096
 """Status files fill whole blocks, so that one can be changed on a disk that has none left."""
@@ -246,16 +245,11 @@ def runs_of(folder: Path, document: Mapping[str, Any]) -> list[Run]:
     wanted: dict[str, list[tuple[Mapping[str, Any], int]]] = {}
     for run in document["runs"]:
         wanted.setdefault(run["id"], []).append((conditions[run["condition"]], run["seed"]))
-    return [
-        Run(
-            folder / RUNS / identity, identity, uses[0][0], uses[0][1], _united([c["tests"] for c, _ in uses])
-        )
-        for identity, uses in wanted.items()
-    ]
-
-
-def _united(lists: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(name for names in lists for name in names))
+    runs = []
+    for identity, uses in wanted.items():
+        tests = dict.fromkeys(test for condition, _ in uses for test in condition["tests"])
+        runs.append(Run(folder / RUNS / identity, identity, *uses[0], tuple(tests)))
+    return runs
 
 
 def read_experiment(folder: Path) -> dict[str, Any] | None:

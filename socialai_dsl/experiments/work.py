@@ -66,18 +66,14 @@ class _FailedError(Exception):
     """A process ended with an error; the message is what it said."""
 
 
-def never() -> bool:
-    """For an engine that stops its workers by other means."""
-    return False
-
-
-def perform(folder: Path, run_id: str, stop: Stop = never) -> End:
+def perform(folder: Path, run_id: str, stop: Stop = lambda: False) -> End:
     """Bring one run of an experiment to its end, from wherever it stands. All engines call this function.
 
     Args:
         folder: the experiment's.
         run_id: which run.
-        stop: asked several times a second whether the run is to be left as it stands.
+        stop: asked several times a second whether the run is to be left as it stands; engines that stop their workers
+            by other means leave it out.
 
     Returns:
         What came of it. Errors of the run and of its folder are no exceptions: they stop this run, and no other.

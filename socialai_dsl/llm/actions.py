@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import dropwhile
 from typing import Any, Final, Literal, NamedTuple, get_args
 
-from socialai_dsl.diagnostics import did_you_mean, printable
+from socialai_dsl.diagnostics import printable, suggested
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.vocabulary import NOUN, words
 
@@ -156,7 +157,7 @@ class ActionLanguage:
         text = conclusion(reply)
         if not text.strip():
             return self._wrong("the reply was empty" if not reply.strip() else "the reply held no action")
-        candidates: list[tuple[int, str | dict[str, Any]]] = [*_marked(text), *objects(text)]
+        candidates: list[tuple[int, str | dict[str, Any]]] = [*marked(text, _MARK), *objects(text)]
         if candidates:
             _, meant = max(candidates, key=lambda candidate: candidate[0])
             return self._meaning(meant) if isinstance(meant, str) else self._arguments(meant)
@@ -337,8 +338,8 @@ class ActionLanguage:
 
     def _unsayable(self, text: str) -> Parsed:
         quoted = next((match[1] or match[2] for match in _QUOTATION.finditer(text)), text)
-        near = did_you_mean(quoted.strip(), self._sentences[:2000])
-        hint = f"; did you mean {json.dumps(near, ensure_ascii=False)}?" if near else ""
+        as_json = partial(json.dumps, ensure_ascii=False)
+        hint = suggested(quoted.strip(), self._sentences[:2000], quoted=as_json)
         return self._wrong(f"{_cited(quoted)} cannot be said{hint}")
 
     def _wrong(self, what: str) -> Parsed:
@@ -358,12 +359,12 @@ def conclusion(reply: str) -> str:
     return _THOUGHT.sub(" ", readable)
 
 
-def _marked(text: str) -> Iterator[tuple[int, str]]:
-    """The last line marked as the action that says something, and where it begins."""
-    for mark in reversed(list(_MARK.finditer(text))):
-        for line in text[mark.end() :].splitlines()[:4]:
+def marked(text: str, mark: re.Pattern[str]) -> Iterator[tuple[int, str]]:
+    """The last line behind a mark that says something, and where it begins."""
+    for found in reversed(list(mark.finditer(text))):
+        for line in text[found.end() :].splitlines()[:4]:
             if line.strip(" `*_\t"):
-                yield mark.end(), line
+                yield found.end(), line
                 return
 
 

@@ -67,10 +67,10 @@ class Usage:
 
 @dataclass(frozen=True)
 class Answer:
-    """A model's answer: text, the tools that it calls as (id, call), and the usage."""
+    """A model's answer: text, the tools that it calls, and the usage."""
 
     text: str
-    calls: tuple[tuple[str, ToolCall], ...]
+    calls: tuple[ToolCall, ...]
     usage: Usage
 
 
@@ -178,14 +178,14 @@ class Endpoint:
             message = found["choices"][0]["message"]
             text = message.get("content") or message.get("refusal") or ""
             calls = tuple(
-                (str(call.get("id", "")), ToolCall(call["function"]["name"], call["function"]["arguments"]))
+                ToolCall(call["function"]["name"], call["function"]["arguments"])
                 for call in message.get("tool_calls") or ()
             )
             usage = found.get("usage") or {}
             counts = usage.get("prompt_tokens"), usage.get("completion_tokens")
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             return None
-        if not isinstance(text, str) or not all(isinstance(part, str) for _, call in calls for part in call):
+        if not isinstance(text, str) or not all(isinstance(part, str) for call in calls for part in call):
             return None
         prompt, completion = (count if isinstance(count, int) and count >= 0 else None for count in counts)
         estimated = prompt is None or completion is None

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from functools import cache
 from typing import Any, Final
 
-from socialai_dsl.library import prelude
+from socialai_dsl.library import types_by_code
 from socialai_dsl.program import GESTURES, NO_GESTURE, EntityColumn, Header, Program, unpack_held
 from socialai_dsl.render.gestures import gesture_shown
 from socialai_dsl.render.marks import LookWords, marks_of
-from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import COLORS, NPC, UNSEEN
 
 LOOKS: Final = 4
@@ -39,11 +37,10 @@ def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
     """Status code in the picture -> the kind of NPC that looks so; codes of several kinds are left out."""
     words: dict[int, set[str]] = {}
     for program in programs:
-        start = program.header(Header.ENTITY_AT)
-        for number, entity in enumerate(program.entities):
+        codes = program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].tolist()
+        for entity, code in zip(program.entities, codes, strict=True):
             if entity.role == "npc":
-                code = program.words[start + EntityColumn.COLUMNS * number + EntityColumn.KIND]
-                words.setdefault(int(code), set()).add(entity.type)
+                words.setdefault(code, set()).add(entity.type)
     # What an NPC with a drawn kind looks like is one of several codes, of which the program holds the greatest.
     alike = {code: kinds.pop() for code, kinds in words.items() if len(kinds) == 1}
     return {code: kind for code, kind in alike.items() if " or " not in kind}
@@ -51,7 +48,7 @@ def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
 
 def is_surface(cell: Cell) -> bool:
     """Whether a cell shows what usually covers many cells, or nothing because it is out of sight."""
-    found = _types().get(cell[0])
+    found = types_by_code().get(cell[0])
     return cell[0] == UNSEEN or (found is not None and found.name in _SURFACES)
 
 
@@ -87,7 +84,7 @@ def _facts(
         what = kinds.get(status, f"person of look {status}")
         look = {"what": what, "color": COLORS[colour], "looking": directions[orientation]}
         return look | _gestures(numbers, directions) | _carried(numbers)
-    found = _types().get(kind)
+    found = types_by_code().get(kind)
     if found is None:
         return {"what": f"thing {kind}.{status}.{orientation}", "color": COLORS[colour]}
     told = {"what": found.name.replace("_", " ")}
@@ -133,7 +130,7 @@ def _carried(shown: Mapping[str, int]) -> dict[str, str]:
     if held == NO_GESTURE:
         return {}
     kind, colour = unpack_held(held)
-    found = _types().get(kind)
+    found = types_by_code().get(kind)
     return {
         "carrying": _with_article(f"{COLORS[colour]} {found.name.replace('_', ' ') if found else 'thing'}")
     }
@@ -161,8 +158,3 @@ def _beside_it(right: int, nearer: int) -> str:
 def steps(count: int) -> str:
     """A number of steps in words."""
     return "1 step" if count == 1 else f"{count} steps"
-
-
-@cache
-def _types() -> dict[int, ObjectType]:
-    return {found.code: found for found in prelude().types.values()}

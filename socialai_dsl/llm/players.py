@@ -197,11 +197,6 @@ class LanguageModelPlayer:
         self._spent = Usage()
         self._answered = False
 
-    @property
-    def spent(self) -> Usage:
-        """The usage of this player, without that of earlier ones."""
-        return self._spent
-
     def play(
         self,
         episodes: int,
@@ -333,7 +328,7 @@ class Conversation:
         if question is not None:
             record |= {"probe": question.probe, "question": self._put(question), "right": question.right}
         elif self._manner.mode == "tools":
-            record["calls"] = [[call.name[:_KEPT], call.arguments[:_KEPT]] for _, call in answer.calls]
+            record["calls"] = [[call.name[:_KEPT], call.arguments[:_KEPT]] for call in answer.calls]
         usage = answer.usage
         record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
         record |= {"estimated": True} if usage.estimated else {}

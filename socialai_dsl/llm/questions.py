@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.asking import Question
-from socialai_dsl.llm.actions import Mode, conclusion, objects
+from socialai_dsl.llm.actions import Mode, conclusion, marked, objects
 
 _MARK: Final = re.compile(r"(?<![\w\"'])answer[*_`]*\s*(?::|\bis\b:?)[*_`]*", re.IGNORECASE)
 _WORD: Final = re.compile(r"(?<!\w)-\d+|(?:[^\W_]|')+")
@@ -90,22 +90,13 @@ def read_answer(reply: str, answers: Sequence[str]) -> str | None:
     without either, the last line, and then the whole reply. Case, punctuation, markdown and further words do not count.
     """
     text = conclusion(reply)
-    marked = [(at, line) for at, line in _marked(text)]
-    marked += [(at, str(found["answer"])) for at, found in objects(text) if "answer" in found]
-    if marked:
-        return _named(max(marked)[1], answers)
+    given = [*marked(text, _MARK)]
+    given += [(at, str(found["answer"])) for at, found in objects(text) if "answer" in found]
+    if given:
+        return _named(max(given)[1], answers)
     lines = [line for line in text.splitlines() if line.strip(" `*_\t")]
     found = (_named(part, answers) for part in (*lines[-1:], text))
     return next((answer for answer in found if answer is not None), None)
-
-
-def _marked(text: str) -> Iterable[tuple[int, str]]:
-    """The last line marked as the answer that says something, and where it begins."""
-    for mark in reversed(list(_MARK.finditer(text))):
-        for line in text[mark.end() :].splitlines()[:4]:
-            if line.strip(" `*_\t"):
-                return [(mark.end(), line)]
-    return []
 
 
 def _named(text: str, answers: Sequence[str]) -> str | None:

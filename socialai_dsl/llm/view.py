@@ -64,6 +64,7 @@ class TextView:
         self._kinds = kinds_of(list(self._members.values()))
         self._channels = channels_of(self._members.values())
         self._looks = words_of_looks(self._members.values())
+        self._egocentric = {_is_egocentric(program) for program in self._members.values()}
         words = Counter(word for look in self._looks.values() for word in look)
         self._shared = frozenset(word for word, looks in words.items() if looks > 1)
         self._language = ActionLanguage(program)
@@ -108,14 +109,13 @@ class TextView:
     def _explanation(self) -> str:
         """How to read what is seen."""
         blocked = any(program.header(Header.FLAGS) & Flag.OCCLUSION for program in self._members.values())
-        egocentric = {_is_egocentric(program) for program in self._members.values()}
         parts = [
             f"You see the cells up to {VIEW - 1} steps ahead of you and up to {VIEW // 2} steps to your left and "
             f"right{', as far as nothing blocks your sight' if blocked else ''}."
         ]
-        if True in egocentric:
+        if True in self._egocentric:
             parts.append("Directions of others are given as seen from you.")
-        if False in egocentric:
+        if False in self._egocentric:
             parts.append("Directions of others are those of a compass; your own is not given.")
         if self._style == "grid":
             parts.append(
@@ -133,7 +133,7 @@ class TextView:
 
     def _directions(self, info: Mapping[str, Any]) -> tuple[str, ...]:
         """The words for directions of NPCs; only the members of a mixed suite differ in them."""
-        egocentric = {_is_egocentric(program) for program in self._members.values()}
+        egocentric = self._egocentric
         if len(egocentric) > 1:
             egocentric = {_is_egocentric(self._members[info["member"]])}
         return RELATIVE if True in egocentric else COMPASS

@@ -10,13 +10,12 @@ import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.envs.typed import Phrases
 from socialai_dsl.envs.view import View
-from socialai_dsl.program import Flag, Header
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending, endings_of
-from socialai_dsl.replay.state import cast_of, played, present
+from socialai_dsl.replay.state import cast_of, present
 from socialai_dsl.replay.steps import describe_step
-from socialai_dsl.vocabulary import DIRECTIONS, spelt
+from socialai_dsl.vocabulary import spelt
 
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
 """What `describe` says of a member that is shown otherwise, or only counts."""
@@ -98,10 +97,10 @@ class Game:
 
     def __init__(self, scenario: str) -> None:
         loaded = socialai_dsl.load(scenario)
-        self._program = socialai_dsl.compile(loaded)
+        self._env = socialai_dsl.make(scenario)
+        self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
         self._about = _abouts(loaded, self._program)
-        self._env: Any = socialai_dsl.make(scenario).unwrapped
         self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
         self._moments: list[GameMoment] = []
@@ -163,14 +162,11 @@ class Game:
 
     def room(self) -> str:
         """The room as text with escape codes for colours."""
-        return str(self._env.coloured_text())
+        return self._env.coloured_text()
 
     def view(self) -> View:
         """The agent's view."""
-        program = played(self._program, {"member": self.now.member})
-        egocentric = bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
-        facing = DIRECTIONS.index(self._env.describe()["agent"]["facing"])
-        return View(self.now.view, facing, egocentric, self._env.channels, self._env.looks)
+        return self._env.view(self.now.view)
 
     def place(self) -> tuple[int, int] | None:
         """X and y of the agent; None if it has left."""
@@ -180,8 +176,7 @@ class Game:
     def backstage(self) -> list[str]:
         """The hidden state: states of frames, draws, and registers of the cast."""
         state = self._env.describe()
-        program = played(self._program, {"member": self.now.member})
-        cast = cast_of(program)
+        cast = cast_of(self._env.playing)
         lines = present(cast, state)
         for key in dict.fromkeys(name.partition("[")[0] for name in cast):
             found = state[key]

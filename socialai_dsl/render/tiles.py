@@ -75,7 +75,7 @@ def draw_tile(
         draw_gesture(canvas, PALETTE[code[1] % len(PALETTE)], code[3], gesture)
     if agent_direction is not None:
         draw_agent(canvas, agent_direction)
-    if agent_direction is None:
+    else:
         draw_marks(canvas, marks)
     if held is not None:
         _draw_held(canvas, held, marks if agent_direction is not None else ())

@@ -6,17 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from socialai_dsl.program import Program
-from socialai_dsl.program_suite import Playable, ProgramSuite
 
 _NOT_STATE: Final = ("t", "heard", "pending", "last")
 """What `describe` says beside what the room is like."""
-
-
-def played(program: Playable, info: dict[str, Any]) -> Program:
-    """The program of an episode: of a suite the member's that `info` names."""
-    if not isinstance(program, ProgramSuite):
-        return program
-    return program.programs[program.members.index(info["member"])]
 
 
 def cast_of(program: Program) -> tuple[str, ...]:

@@ -10,17 +10,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.envs.view import View
-from socialai_dsl.program import VIEW, Flag, Header, Program
+from socialai_dsl.program import VIEW
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import Marks
 from socialai_dsl.replay import document
 from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
-from socialai_dsl.replay.state import leaves, played
+from socialai_dsl.replay.state import leaves
 from socialai_dsl.replay.steps import describe_step, heard_line
 from socialai_dsl.semantics.terms import Const
-from socialai_dsl.vocabulary import DIRECTIONS, NOUN
+from socialai_dsl.vocabulary import NOUN
 
 Action = NDArray[np.int64]
 Answers = Sequence[tuple[str, str]]
@@ -216,8 +215,8 @@ class Tracer:
     def _add(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], **more: Any) -> Moment:
         """Add a moment, with what differs from the one before it."""
         scene, described = self._env.scene(), self._env.describe()
+        view = self._env.view(observation["image"])
         height, width = scene.codes.shape[:2]
-        view = self._view(observation["image"], described, info)
         seen = _Seen(
             info.get("member"),
             self._cast(described),
@@ -244,11 +243,6 @@ class Tracer:
         self.moments.append(moment)
         return moment
 
-    def _view(self, image: NDArray[np.uint8], described: Mapping[str, Any], info: Mapping[str, Any]) -> View:
-        egocentric = bool(self._playing(info.get("member")).header(Header.FLAGS) & Flag.EGOCENTRIC)
-        facing = DIRECTIONS.index(described["agent"]["facing"])
-        return View(image, facing, egocentric, self._env.channels, self._env.looks)
-
     def _cast(self, described: Mapping[str, Any]) -> list[Member]:
         """The NPCs, with the names by which they are heard."""
         names = {(entity.key, entity.index): entity.name for entity in self._env.scenario.entities}
@@ -259,9 +253,6 @@ class Tracer:
             fixed = term.type.words[term.value - term.type.low] if isinstance(term, Const) else str(entity)
             members.append(Member(key=str(entity), name=found.get("name", fixed), look=look))
         return members
-
-    def _playing(self, member: str | None) -> Program:
-        return played(self._program, {"member": member})
 
     def _numbers(self, codes: NDArray[np.uint8]) -> list[int]:
         return [self._look(tuple(code)) for row in codes.tolist() for code in row]

@@ -42,8 +42,6 @@ from socialai_dsl.reporting.records import (
 from socialai_dsl.reporting.seeds import read_updates
 from trainer.config import HYPER, RunConfig, configure
 
-_SEED_KEYS: Final = frozenset({"seed"})
-
 Content = TypeVar("Content")
 
 _RESULT: Final = TypeAdapter(ResultRecord)
@@ -60,7 +58,7 @@ class Run:
         id, seed: which. folder: where it lies.
         state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it runs and no process
             works on it; `missing` where there is no folder.
-        message: what its status says. attempts: how often it was begun, as far as known.
+        message: what its status says.
         result: of a finished run. rooms: success by number of the test episode, where the run lists its episodes.
         tests: scenario -> figures of its further tests.
         frames: made so far. digest: of its configuration without the seed; empty if it has none.
@@ -73,7 +71,6 @@ class Run:
     folder: Path
     state: str
     message: str = ""
-    attempts: int = 0
     result: ResultRecord | None = None
     rooms: pd.Series = field(default_factory=lambda: pd.Series(dtype=float))
     tests: Mapping[str, Figures] = field(default_factory=dict)
@@ -168,7 +165,7 @@ def read_experiment(folder: Path) -> Experiment:
         )
         for entry in record.conditions
     )
-    return Experiment(record.name, record.profile or "", record.about or "", record.source_sha256, conditions)
+    return Experiment(record.name, record.profile, record.about, record.source_sha256, conditions)
 
 
 def read_runs(folders: Sequence[Path]) -> Experiment:
@@ -218,14 +215,10 @@ def unusual(settings: Mapping[str, Any]) -> list[str]:
         config = RunConfig.model_validate_json(json.dumps(settings))
     except ValidationError:
         return []
-    named = [f"net {config.net}"] * (config.net != "fast") + [f"recipe {config.recipe}"] * (
-        config.recipe != "plain"
-    )
-    told = configure(config.recipe, net=config.net).model_dump()
-    chosen = [
-        name for name in ("bonus", "curriculum", "guide", *HYPER) if getattr(config, name) != told[name]
-    ]
-    words = ("bonus", "curriculum", "guide")
+    named = [f"net {config.net}"] if config.net != "fast" else []
+    named += [f"recipe {config.recipe}"] if config.recipe != "plain" else []
+    told, words = configure(config.recipe, net=config.net).model_dump(), ("bonus", "curriculum", "guide")
+    chosen = [name for name in (*words, *HYPER) if getattr(config, name) != told[name]]
     return named + [
         f"{name} {getattr(config, name)}" if name in words else f"{name}={getattr(config, name)}"
         for name in chosen
@@ -247,7 +240,6 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
         folder,
         _state(folder, status, result, frames),
         message=(status.message or "") if status is not None else "",
-        attempts=len(status.attempts) if status is not None else 0,
         result=result,
         rooms=_rooms(folder / EPISODES, problems),
         tests=_read(folder / TESTS, _TESTS, problems) or {},
@@ -336,5 +328,5 @@ def _digest(settings: Mapping[str, Any]) -> str:
 
 def _without_seed(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _without_seed(part) for key, part in value.items() if key not in _SEED_KEYS}
+        return {key: _without_seed(part) for key, part in value.items() if key != "seed"}
     return value

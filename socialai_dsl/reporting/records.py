@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -133,14 +133,12 @@ class StatusRecord(_Record):
     """`status.json`; a run without it is judged by the files it has."""
 
     state: Literal["waiting", "running", "done", "failed", "cancelled"]
-    attempts: list[Any] = Field(default_factory=list)
     message: str | None = None
 
 
 class StartRecord(_Record):
     """A line of `starts.jsonl`."""
 
-    torch: str = ""
     cpu: str = ""
     device: str = ""
     threads: int = 0

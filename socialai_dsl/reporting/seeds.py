@@ -33,12 +33,6 @@ class Seeds:
     success: Float
     rates: Mapping[str, Float]
 
-    @property
-    def shortest(self) -> float:
-        """Frames of the run that ended first; what is known beyond is of the others alone."""
-        bins = np.arange(len(self.frames))
-        return float(self.frames[np.where(np.isnan(self.success), 0, bins).max(1).min()])
-
     def means(self, kind: str) -> dict[str, Float]:
         """Mean over the seeds of the rates of `outcomes` or of `rules`, by their own names, (B,) each."""
         start = f"{kind}/"
@@ -47,15 +41,6 @@ class Seeds:
             for name, rate in self.rates.items()
             if name.startswith(start)
         }
-
-
-def read_seeds(metrics: Sequence[Path], bins: int = 40) -> Seeds:
-    """Read the `metrics.jsonl` of runs that differ in nothing but their seed; see `read_updates` and `align`.
-
-    Raises:
-        ValueError: a file is empty or damaged.
-    """
-    return align([read_updates(path) for path in metrics], bins)
 
 
 def read_updates(metrics: Path) -> list[UpdateRecord]:

@@ -52,9 +52,8 @@ class Session:
     def __init__(self) -> None:
         self._path = Path()
         self._texts: dict[Path, Source] = {}
-        self._env: ScenarioEnv | None = None
+        self._game: tuple[ScenarioEnv, Tracer] | None = None
         self._phrases = Phrases((), Sentences((), (), ()))
-        self._tracer: Tracer | None = None
         self._moments: list[_Before] = []
         self._player, self._seed = "me", 0
         self._policy: Any = None
@@ -91,19 +90,18 @@ class Session:
             raise RefusalError(f"seed: got {seed!r}, expected a whole number from 0")
         if player != self._player:
             self._choose(player)
-        env = self._playing()
+        env, tracer = self._playing()
         try:
             observation, info = env.reset(seed=seed, options=None if layout is None else {"layout": layout})
         except (ValueError, RoomError) as error:
             raise RefusalError(str(error)) from None
-        assert self._tracer is not None, "internal: a program that can be played has a tracer"
         self._seed, self._chance = seed, np.random.default_rng(seed)
         if self._policy is not None:
             self._policy.reset(np.ones(1, np.bool_))
-        self._tracer.begin(f"seed {seed}" if layout is None else "a layout", observation, info)
+        tracer.begin(f"seed {seed}" if layout is None else "a layout", observation, info)
         self._moments = [_Before(env.snapshot(), observation, self._chance.bit_generator.state, False)]
         return {
-            "trace": self._tracer.trace().model_dump(mode="json", exclude_defaults=True)
+            "trace": tracer.trace().model_dump(mode="json", exclude_defaults=True)
             | {"format": "socialai-trace/1"},
             "phrases": {"sentences": self._phrases.sentences()[:2000]},
             "rules": list(env.counters()["rules"]),
@@ -113,7 +111,7 @@ class Session:
 
     def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
         """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
-        env = self._playing()
+        env, _ = self._playing()
         if line is not None:
             movement, sentence = split_line(line.strip(), self._phrases.actions)
         try:
@@ -124,7 +122,7 @@ class Session:
 
     def auto(self) -> Reply:
         """Let the chosen player play a step."""
-        env = self._playing()
+        env, _ = self._playing()
         if self._player == "script":
             return self._step(env.scripted_action(), None)
         sizes = env.action_space.nvec  # type: ignore[attr-defined]
@@ -138,13 +136,12 @@ class Session:
 
     def back(self, to: int) -> Reply:
         """Take steps back until `to` of them are left, chance included."""
-        env = self._playing()
-        assert self._tracer is not None, "internal: an episode has begun"
+        env, tracer = self._playing()
         if not 0 <= to < len(self._moments):
             raise RefusalError(f"there are {len(self._moments) - 1} steps to take back")
         while len(self._moments) > to + 1:
             self._moments.pop()
-            self._tracer.back()
+            tracer.back()
         now = self._moments[-1]
         env.restore(now.snapshot)
         self._chance.bit_generator.state = dict(now.chance)
@@ -156,7 +153,8 @@ class Session:
 
     def place(self, who: str, at: list[int]) -> Reply:
         """Begin again in the same room with one thing somewhere else; the layout is told, too."""
-        described = self._playing().describe()
+        env, _ = self._playing()
+        described = env.describe()
         if len(self._moments) != 1:
             raise RefusalError("things are moved before the first step; begin the episode again first")
         key, _, index = who.rstrip("]").partition("[")
@@ -170,14 +168,15 @@ class Session:
             raise RefusalError(f"there is nothing called {who!r} in the room")
         one["at"] = at
         layout = start_layout(described) | ({"member": described["member"]} if "member" in described else {})
-        cell = self._playing().scene().codes[at[1], at[0]] if _is_cell(at, described["room"]) else None
+        cell = env.scene().codes[at[1], at[0]] if _is_cell(at, described["room"]) else None
         if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
             raise RefusalError(f"{who} cannot be put there")
         return self.begin(self._seed, self._player, layout) | {"layout": layout}
 
     def layout(self) -> Reply:
         """The room as it is now, as a layout that the commands take."""
-        return {"layout": self._playing().describe()}
+        env, _ = self._playing()
+        return {"layout": env.describe()}
 
     def write_layout(self, text: str) -> Reply:
         """The text of the file, with the room as it is now as the start of every episode.
@@ -185,7 +184,8 @@ class Session:
         Of a suite, the member that is played gets a `layout`. Of a scenario the reply has `suite`, the text of a new
         suite that begins so, and the `name` of its file.
         """
-        described = self._playing().describe()
+        env, _ = self._playing()
+        described = env.describe()
         layout, stem = start_layout(described), self._path.stem
         loaded = load(str(self._path), {self._path: Source(display_name(self._path), text)})
         if not isinstance(loaded, LoadedSuite):
@@ -201,9 +201,8 @@ class Session:
 
     def replay(self) -> Reply:
         """The episode so far as a page of its own."""
-        self._playing()
-        assert self._tracer is not None, "internal: an episode has begun"
-        return {"page": replay_page([self._tracer.trace()])}
+        _, tracer = self._playing()
+        return {"page": replay_page([tracer.trace()])}
 
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
         """What `socialai check` says of a text."""
@@ -224,10 +223,10 @@ class Session:
     def _use(self, loaded: Loaded) -> None:
         """Play this from now on."""
         program = compile_loaded(loaded)
-        self._env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
+        env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
         self._phrases = Phrases(program.actions, program.sentences)
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
-        self._tracer = Tracer(self._env, loaded.name, "me", endings, about_of(loaded))
+        self._game = env, Tracer(env, loaded.name, "me", endings, about_of(loaded))
         self._player, self._policy, self._moments = "me", None, []
 
     def _choose(self, player: str) -> None:
@@ -244,20 +243,18 @@ class Session:
             if unscripted(loaded):
                 raise RefusalError("the variant `oracle` gives the agent no frame")
         self._use(loaded)
+        env, tracer = self._playing()
         if player not in ("me", "script", "random"):
-            self._policy = _policy(player, self._env)
-        self._player = player
-        assert self._tracer is not None, "internal: there is a program"
-        self._tracer.agent = player
+            self._policy = _policy(player, env)
+        self._player = tracer.agent = player
 
-    def _playing(self) -> ScenarioEnv:
-        if self._env is None:
+    def _playing(self) -> tuple[ScenarioEnv, Tracer]:
+        if self._game is None:
             raise RefusalError("there is no room yet; the scenario has mistakes")
-        return self._env
+        return self._game
 
     def _step(self, action: NDArray[np.int64], thought: Thought | None) -> Reply:
-        env, tracer = self._playing(), self._tracer
-        assert tracer is not None, "internal: an episode has begun"
+        env, tracer = self._playing()
         if not self._moments or self._moments[-1].ended:
             raise RefusalError("the episode has ended; take steps back, or begin another")
         before = tracer.counts()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.properties import check_property
+from socialai_dsl.analysis.perceiving import perceived
+from socialai_dsl.analysis.properties import Trial
 from socialai_dsl.analysis.reports import Report, Verdict
+from socialai_dsl.engine.calls import RoomError
 
 # One of two doors is right. Ada tells which to whoever asks and is in front of her.
 TOLD = """
@@ -66,7 +69,8 @@ def tried(tmp_path: Path) -> Trying:
         assert isinstance(loaded, socialai_dsl.LoadedScenario)
         assert isinstance(scripted, socialai_dsl.LoadedScenario)
         (plan,) = loaded.checked.properties
-        return check_property(loaded, plan, Effort(ROOMS, 1, states), scripted)
+        effort = Effort(ROOMS, 1, states)
+        return Trial(loaded, effort, scripted).check(plan, effort)
 
     return trying
 
@@ -175,7 +179,7 @@ def test_knowing_too_late_is_no_better_than_a_guess(tmp_path: Path, exclusive: s
     file.write_text(BOXES.replace("exclusive: true", f"exclusive: {exclusive}"))
     loaded = socialai_dsl.load(file)
     assert isinstance(loaded, socialai_dsl.LoadedScenario)
-    report = check_property(loaded, loaded.checked.properties[0], Effort(2))
+    report = Trial(loaded, Effort(2)).check(loaded.checked.properties[0], Effort(2))
     assert report.verdict is verdict
 
 
@@ -250,3 +254,22 @@ def test_a_script_that_knows_what_it_was_not_told_peeks(tried: Trying) -> None:
     assert tried("{script: perceives, share: 0}", deaf).verdict is Verdict.FAILS, (
         "one room at least has to hold"
     )
+
+
+def test_rooms_that_cannot_be_drawn_do_not_count_where_a_script_peeks(tmp_path: Path) -> None:
+    rare = TOLD.replace("exit: pick(doors)", "exit: pick(doors), odd: pick(1..100)").replace(
+        "outcome:", "require: [odd == 7]\noutcome:"
+    )
+    (tmp_path / "told.yaml").write_text(rare.replace("say: Number <exit.index>, goto", "goto"))
+    (tmp_path / "told_oracle.yaml").write_text(SCRIPT)
+    scripted = socialai_dsl.load(f"{tmp_path / 'told.yaml'}+oracle")
+    assert isinstance(scripted, socialai_dsl.LoadedScenario)
+    env = socialai_dsl.make(socialai_dsl.compile(scripted))
+    drawn = []
+    for index in range(ROOMS):
+        with contextlib.suppress(RoomError):
+            env.reset(seed=1, options={"index": index})
+            drawn.append(index)
+    assert 0 < len(drawn) < ROOMS
+    assert {peek.index for peek in perceived(scripted, ROOMS, 1).peeks} == set(drawn)
+    assert perceived(scripted, drawn[0], 1).pairs == 0

@@ -9,7 +9,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.properties import by_default, check_property
+from socialai_dsl.analysis.properties import Trial, by_default
 from socialai_dsl.analysis.reports import Report, Verdict
 from socialai_dsl.checking.loaded import LoadedScenario
 
@@ -68,7 +68,8 @@ def tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trying:
         loaded = socialai_dsl.load(tmp_path / "told.yaml")
         assert isinstance(loaded, LoadedScenario)
         (plan,) = loaded.checked.properties
-        return check_property(loaded, plan, Effort(ROOMS, 1, 5_000), loaded)
+        effort = Effort(ROOMS, 1, 5_000)
+        return Trial(loaded, effort, loaded).check(plan, effort)
 
     return trying
 
@@ -206,6 +207,7 @@ def test_a_void_scenario_is_found_without_any_claim(
     loaded = socialai_dsl.load(file)
     assert isinstance(loaded, LoadedScenario)
     (plan,) = by_default(loaded, loaded.resolved.tree.key_span(("outcome",)))
-    report = check_property(loaded, plan, Effort(ROOMS, 0, 20_000))
+    effort = Effort(ROOMS, 0, 20_000)
+    report = Trial(loaded, effort).check(plan, effort)
     assert report.verdict is Verdict.FAILS
     assert said in report.said

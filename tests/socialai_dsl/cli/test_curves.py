@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.reporting.seeds import mean_over_seeds, read_seeds
+from socialai_dsl.reporting.seeds import align, mean_over_seeds, read_updates
 from tests.socialai_dsl.reporting.synthetic import figures
 
 
@@ -32,7 +32,7 @@ def write_metrics(path: Path, rows: list[str]) -> Path:
 
 def test_a_bin_counts_episodes_and_does_not_average_rates(tmp_path: Path) -> None:
     rows = [row(1, 10, 0.5, 2.0), row(2, 30, 0.1, 0.0), row(3, 0, None), row(4, 4, 1.0, 1.0)]
-    seeds = read_seeds([write_metrics(tmp_path / "m.jsonl", rows)], bins=2)
+    seeds = align([read_updates(write_metrics(tmp_path / "m.jsonl", rows))], bins=2)
     assert seeds.frames.tolist() == [200, 400]
     assert seeds.success.tolist() == [[(5 + 3) / 40, 1.0]]
     assert seeds.rates["rules/ask"].tolist() == [[20 / 40, 1.0]]
@@ -40,7 +40,8 @@ def test_a_bin_counts_episodes_and_does_not_average_rates(tmp_path: Path) -> Non
 
 
 def test_a_bin_without_episodes_is_unknown(tmp_path: Path) -> None:
-    seeds = read_seeds([write_metrics(tmp_path / "m.jsonl", [row(1, 0, None), row(2, 2, 0.5)])])
+    metrics = write_metrics(tmp_path / "m.jsonl", [row(1, 0, None), row(2, 2, 0.5)])
+    seeds = align([read_updates(metrics)])
     assert np.isnan(seeds.success[0, 0])
     assert seeds.success[0, 1] == 0.5
 
@@ -48,14 +49,12 @@ def test_a_bin_without_episodes_is_unknown(tmp_path: Path) -> None:
 def test_a_shorter_run_is_unknown_after_its_end(tmp_path: Path) -> None:
     long = write_metrics(tmp_path / "long.jsonl", [row(n, 1, 1.0) for n in range(1, 9)])
     short = write_metrics(tmp_path / "short.jsonl", [row(n, 1, 0.0) for n in range(1, 5)])
-    seeds = read_seeds([long, short])
+    seeds = align([read_updates(long), read_updates(short)])
     assert seeds.frames[-1] == 800
     assert seeds.success[0].tolist() == [1.0] * 8
     assert seeds.success[1, :4].tolist() == [0.0] * 4
     assert np.isnan(seeds.success[1, 4:]).all()
     assert mean_over_seeds(seeds.success).tolist() == [0.5] * 4 + [1.0] * 4
-    assert seeds.shortest == 400
-    assert read_seeds([long]).shortest == 800
 
 
 def make_run(folder: Path, scenario: str, seed: int, rate: float, bonus: str = "none") -> Path:

@@ -217,6 +217,19 @@ def test_standard_input_stands_for_a_file(
     assert (folder / "sub" / "heir.yaml").read_text() == "nonsense: ["
 
 
+@pytest.mark.parametrize("on_disk", [None, "nonsense: ["])
+def test_deep_tries_the_text_of_standard_input(
+    on_disk: str | None, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    if on_disk is not None:
+        Path("claiming.yaml").write_text(on_disk)
+    piped(monkeypatch, CLAIMING.encode())
+    command = ["validate", "--deep", "-", "--rooms", "3", "--stdin-filename", "claiming.yaml", "--json"]
+    assert main(command) == 1
+    found = {(d["file"], d["code"], d["line"]) for d in json.loads(capsys.readouterr().out)}
+    assert found >= {("claiming.yaml", "S801", 10), ("claiming.yaml", "W802", 9)}
+
+
 @pytest.mark.parametrize(
     ("content", "code"), [(b"\xff\xfes\0", "S006"), (b"", "S108"), (b"x" * (1 << 21), "S004")]
 )

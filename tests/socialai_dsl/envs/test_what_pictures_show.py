@@ -25,7 +25,7 @@ from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.grid import draw_grid, figures
 from socialai_dsl.render.tiles import draw_tile
 from socialai_dsl.replay.film import record
-from socialai_dsl.replay.state import cast_of, played
+from socialai_dsl.replay.state import cast_of
 from tests.quick import one_in
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -131,11 +131,10 @@ def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
         game.begin("", {"seed": seed})
         for _, action in zip(range(STEPS), acting(env, seed), strict=False):
             image = game.now.view.tobytes()
-            program = played(env.program, {"member": game.now.member})
             view = game.view()
             texts = [
                 frame(env._table, 0, "ansi"),
-                "\n".join([env.plain_text(), *present(cast_of(program), env.describe())]),
+                "\n".join([env.plain_text(), *present(cast_of(env.playing), env.describe())]),
                 "\n".join([game.room(), view.text, *view.figures]),
             ]
             for known, text in zip(shown, texts, strict=True):

@@ -93,7 +93,7 @@ def lonely(town: Program) -> Table:
     words[Header.FRAMES] = words[Header.FLAGS] = 0
     words[h(Header.OUTCOME_AT) :][: 8 * h(Header.CLASSES)] = 0
     words[Header.REQUIRE_PC], words[Header.RULES_PC] = 0, 1
-    table = Table([replace(town, words=words)], 1, 1)
+    table = Table([replace(town, words=words)], 1)
     table.reset(0, None)
     table.batch.tables.words[h(Header.CODE_AT) + 8] = Op.HALT
     return table

@@ -24,7 +24,7 @@ def runs(folder: Path) -> list[Run]:
 def test_a_finished_run_is_read_whole(folder: Path) -> None:
     write_tests(folder / "runs" / "c0-s1", {"help_as_helper": 0.1})
     first, second, *_ = runs(folder)
-    assert (first.state, first.frames, first.attempts, first.problems) == ("done", 1000, 1, ())
+    assert (first.state, first.frames, first.problems) == ("done", 1000, ())
     assert first.figures is not None
     assert first.figures.success_rate == 0.2
     assert second.tests["help_as_helper"].success_rate == 0.1
@@ -47,7 +47,7 @@ def test_runs_in_every_state(folder: Path) -> None:
     found = runs(folder)
     assert [run.state for run in found] == ["missing", "running", "failed", "running"]
     assert [run.result for run in found] == [None] * 4
-    assert (found[2].message, found[2].attempts) == ("no space", 2)
+    assert found[2].message == "no space"
     assert found[3].frames == 1000, "the line that was never finished does not count"
 
 
