@@ -262,25 +262,7 @@ _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 _OF_ALL_VARIANTS = frozenset({"W314", "W317"})
 """What a variant may leave without a use in parts that are there for the others."""
 
-_MAY_FOLLOW = frozenset(
-    {
-        "S105",
-        "S201",
-        "S204",
-        "S205",
-        "S206",
-        "S213",
-        "S301",
-        "S302",
-        "S303",
-        "S304",
-        "S305",
-        "S310",
-        "S315",
-        "S401",
-        "S402",
-    }
-)
+_MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 S310 S315 S401 S402".split())
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
 _OF_WHOLE_FILES = frozenset({"S316"})

@@ -32,13 +32,13 @@ from socialai_dsl.semantics.scope import (
     PlayedFrame,
     Scope,
     Symbols,
-    at_every_step,
     dotted,
     frames_of,
     is_nothing,
     parse_define,
     reset_scope,
     select,
+    step_scope,
     surviving,
     with_article,
 )
@@ -351,7 +351,7 @@ def check_slots(resolver: Resolver) -> None:
         for slot, paths in played.texts.items():
             for which, path in enumerate(paths or ()):
                 filled = resolver.symbols.alternatives[member][which].with_[slot]
-                scope = at_every_step(reset_scope(path, f"cast.{member}.with.{slot}", member))
+                scope = step_scope(path, f"cast.{member}.with.{slot}", member)
                 with surviving():
                     if played.model.slots[slot] == "bool":
                         slot_truth(resolver, slot, filled, scope)
@@ -627,8 +627,8 @@ def _objects(
             type=objects.type,
             status=status if isinstance(status, int) else objects.type.initial,
             initial=None if isinstance(status, int) else status,
-            unlocks=resolver.unlocks.get(number, ()),
-            opens=resolver.opens.get(number, ()),
+            unlocks=object_facts.links(resolver, object_facts.UNLOCKS).get(number, ()),
+            opens=object_facts.links(resolver, object_facts.OPENS).get(number, ()),
             timer=described.timer or 0,
             exclusive=tuple(objects.numbers) if described.exclusive else (),
             pushed_by_rolling=rolled,

@@ -45,7 +45,6 @@ class Cell:
         options: those of `OPTIONS` that are given.
         tests: scenarios played besides, with all variants -> what was found elsewhere.
         reference: what was found elsewhere on the scenario itself.
-        place: where the condition stands in the file.
         places: setting -> where its value stands.
     """
 
@@ -60,7 +59,6 @@ class Cell:
     options: Mapping[str, Any]
     tests: Mapping[str, Reference | None]
     reference: Reference | None
-    place: DataPath
     places: Mapping[str, DataPath]
 
     @property
@@ -320,7 +318,6 @@ class _Expansion:
                 for name, reference in map(_tested, given.get("tests", ()))
             },
             given.get("reference"),
-            draft.place,
             places,
         )
 
