@@ -239,7 +239,7 @@ class Ranges:
         self._growth: dict[str, int] = {}
         self._rounds = 0
         self._wide: dict[str, Type] | None = None
-        setters = sum(bool(entry.set) for frame in scenario.frames.values() for entry in frame.all_effects())
+        setters = sum(bool(entry.set) for _, frame in frames_of(scenario) for entry in frame.all_effects())
         self._steps = scenario.horizon * (setters + sum(bool(rule.set) for rule in scenario.rules))
 
     def settled(self, needed: Mapping[str, Type]) -> bool:
