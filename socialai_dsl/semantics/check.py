@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from operator import itemgetter
@@ -239,8 +240,12 @@ class Ranges:
         self._growth: dict[str, int] = {}
         self._rounds = 0
         self._wide: dict[str, Type] | None = None
-        setters = sum(bool(entry.set) for _, frame in frames_of(scenario) for entry in frame.all_effects())
-        self._steps = scenario.horizon * (setters + sum(bool(rule.set) for rule in scenario.rules))
+        followed = Counter(member.frame for member in scenario.members().values())
+        setters = sum(bool(rule.set) for rule in scenario.rules)
+        for path, frame in frames_of(scenario):
+            own = sum(bool(entry.set) for entry in frame.all_effects())
+            setters += own * max(1, followed[str(path[-1])])
+        self._steps = scenario.horizon * setters
 
     def settled(self, needed: Mapping[str, Type]) -> bool:
         """Take note of the ranges that a resolution asked for; whether it had them already."""
