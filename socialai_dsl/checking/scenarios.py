@@ -7,7 +7,7 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean, meant
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
@@ -63,10 +63,9 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
             values[name] = default
     for name in resolved.params:
         if name not in declared:
-            near = did_you_mean(name, declared)
-            hint = None if near else "it has " + ", ".join(declared) if declared else "it has none"
+            near = meant(name, declared, "it has " + ", ".join(declared) if declared else "it has none")
             message = f"`{resolved.name}` has no parameter `{name}`"
-            bag.error("S206", message, resolved.param_span(name), suggestion=near, hint=hint)
+            bag.error("S206", message, resolved.param_span(name), **near)
     return values
 
 
@@ -89,11 +88,10 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
         return default
     labels = list(map(str, choices)) if isinstance(choices, dict | list) else [str(default)]
     if str(default) not in labels:
-        near = did_you_mean(str(default), labels)
+        near = meant(str(default), labels, "one of " + ", ".join(labels))
         span = resolved.tree.value_span(("params", name, "default"))
-        hint = None if near else "one of " + ", ".join(labels)
         message = f"the default of `{name}` is none of its values"
-        bag.error("S206", message, span, suggestion=near, hint=hint)
+        bag.error("S206", message, span, **near)
     return choices.get(str(default), default) if isinstance(choices, dict) else default
 
 
@@ -102,9 +100,8 @@ def _given(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag:
     text, span = resolved.params[name], resolved.param_span(name)
     if isinstance(choices, dict):
         if text not in choices:
-            near = did_you_mean(text, choices)
-            hint = None if near else "one of " + ", ".join(choices)
-            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, suggestion=near, hint=hint)
+            near = meant(text, choices, "one of " + ", ".join(choices))
+            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, **near)
         return choices.get(text, default)
     value = read_plain(text).value
     if isinstance(choices, list) and (value not in choices or isinstance(value, bool) != _any_bool(choices)):
@@ -352,10 +349,9 @@ def put_grammar(tree: Node, bag: DiagnosticBag) -> None:
         return
     shared = shared_grammars()
     if named.value not in shared:
-        near = did_you_mean(named.value, shared)
-        hint = None if near else "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
+        hint = "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
         message = f"there is no shared grammar `{named.value}`"
-        bag.error("S201", message, named.value_span(), suggestion=near, hint=hint)
+        bag.error("S201", message, named.value_span(), **meant(named.value, shared, hint))
     named.put(shared.get(named.value, next(iter(shared.values()))))
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean, meant
 from socialai_dsl.schema.annotations import (
     CALLED,
     annotation_at,
@@ -567,10 +567,9 @@ class _Report:
             message = f"one of {', '.join(words)} is expected, here is {_kind_of(finding.value)}"
             self._bag.error("S104", message, span)
             return
-        near = did_you_mean(finding.value, words)
-        hint = None if near else "one of " + ", ".join(words)
+        near = meant(finding.value, words, "one of " + ", ".join(words))
         message = f"`{finding.value}` is not a word for `{finding.key}`"
-        self._bag.error("S103", message, span, suggestion=near, hint=hint)
+        self._bag.error("S103", message, span, **near)
 
 
 def _has(part: object, step: object) -> bool:

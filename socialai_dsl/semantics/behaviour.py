@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import did_you_mean, meant
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import addressing, groups, hands, object_facts, rows, texts, those
@@ -168,9 +168,8 @@ def _unknown(
         usage = synonym + (given or "(x)" if takes else "")
         purpose = {"use": "to toggle something ", "enter": "to go through something "}.get(synonym, "")
         return resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
-    near = did_you_mean(name, ACTIVITIES)
-    hint = None if near else "activities are " + ", ".join(ACTIVITIES)
-    return resolver.fail("S205", f"unknown activity `{name}`", node, scope, suggestion=near, hint=hint)
+    near = meant(name, ACTIVITIES, "activities are " + ", ".join(ACTIVITIES))
+    return resolver.fail("S205", f"unknown activity `{name}`", node, scope, **near)
 
 
 def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
@@ -237,9 +236,8 @@ def effects(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> It
             )
     signature = EFFECTS.get(name)
     if signature is None:
-        near = did_you_mean(name, EFFECTS)
-        hint = None if near else "effects are " + ", ".join(EFFECTS)
-        raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, suggestion=near, hint=hint)
+        near = meant(name, EFFECTS, "effects are " + ", ".join(EFFECTS))
+        raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, **near)
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     if (which := those.found(subject)) is None:
@@ -469,11 +467,8 @@ def _look_named(resolver: Resolver, node: ast.Expr, scope: Scope) -> str | None:
     """The look that is set: `ann.mood`, or in a frame `mood`; None if the name is not that of a look."""
     looks = resolver.symbols.scenario.looks
     if isinstance(node, ast.Attribute) and node.name not in looks:
-        near = did_you_mean(node.name, looks)
-        hint = None if near else "what is set before a dot is a look, declared under `looks:`"
-        raise resolver.fail(
-            "S205", f"nothing here has a `{node.name}`", node, scope, suggestion=near, hint=hint
-        )
+        near = meant(node.name, looks, "what is set before a dot is a look, declared under `looks:`")
+        raise resolver.fail("S205", f"nothing here has a `{node.name}`", node, scope, **near)
     name = node.name if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
     return name if name in looks else None
 
@@ -614,20 +609,17 @@ class _Planner:
             what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
             cure = "only what the frame declares in its own `let`, or the scenario in `state`, can be set"
             raise findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
-        near = did_you_mean(name, [*self.played.model.let, *symbols.scenario.state])
-        hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
-        raise findings.fail(
-            "S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint
-        )
+        hint = f"declare it: `let: {{{name}: 0}}` in the frame"
+        near = meant(name, [*self.played.model.let, *symbols.scenario.state], hint)
+        raise findings.fail("S305", f"`{name}` is not declared in this frame's `let`", span, **near)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:
         states = self.played.model.states or {}
         if target is not None and target not in states:
             findings = self.resolver.findings
-            near = did_you_mean(target, states)
+            near = meant(target, states, "its states are " + ", ".join(states))
             message = f"no state `{target}` in frame `{self.played.name}`"
-            hint = None if near else "its states are " + ", ".join(states)
-            findings.error("S301", message, findings.at(path, 0, len(target)), suggestion=near, hint=hint)
+            findings.error("S301", message, findings.at(path, 0, len(target)), **near)
         return target
 
     def step(self, written: DataPath, step: Step) -> StepPlan:

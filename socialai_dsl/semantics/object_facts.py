@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import did_you_mean, meant
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.schema.scenario import Register, Scenario
@@ -475,11 +475,10 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
     for member in map(str, members):
         known = resolver.symbols.cast[member].beliefs
         if node.name not in known:
-            near = did_you_mean(node.name, known)
-            hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
+            hint = f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"
-            raise resolver.no_such(node.name, message, node, scope, suggestion=near, hint=hint)
+            raise resolver.no_such(node.name, message, node, scope, **meant(node.name, known, hint))
     if any(register_of(str(member), node.name) not in resolver.registers for member in members):
         raise FailedError  # what it starts with is missing, which has been reported
     return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import meant
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Look
 from socialai_dsl.semantics import groups
@@ -230,8 +230,7 @@ def check_tone(resolver: Resolver, name: str) -> None:
     looks, findings = resolver.symbols.scenario.looks, resolver.findings
     span = findings.at(("observe", "tone"), 0, len(name))
     if name not in looks:
-        near = did_you_mean(name, looks)
-        hint = None if near else "looks are declared under `looks:`"
-        findings.error("S201", f"unknown look `{name}`", span, suggestion=near, hint=hint)
+        near = meant(name, looks, "looks are declared under `looks:`")
+        findings.error("S201", f"unknown look `{name}`", span, **near)
     elif not any(tone_of(resolver, number) for number in range(1, len(resolver.symbols.numbers))):
         findings.error("S204", f"no NPC has a `{name}`, so nobody speaks in that tone", span)

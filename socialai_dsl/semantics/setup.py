@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import did_you_mean, meant
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
 from socialai_dsl.semantics import groups, hands, object_facts, tables
@@ -181,9 +181,9 @@ def _each_wall(
 
 
 def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
-    near = did_you_mean(name, [*PLACES, "next_to", "in_front_of"])
-    hint = None if near else "places are " + ", ".join([*PLACES, "next_to", "in_front_of"])
-    return resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
+    places = [*PLACES, "next_to", "in_front_of"]
+    near = meant(name, places, "places are " + ", ".join(places))
+    return resolver.fail("S205", f"unknown place `{name}`", node, scope, **near)
 
 
 # -- the room: its sizes, its canvas, and what is built into it ----------------------------------------------
