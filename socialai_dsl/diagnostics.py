@@ -235,6 +235,12 @@ def suggested(
     return otherwise if near is None else f"; did you mean {quoted(near)}?"
 
 
+def advice_on(word: str, known: Iterable[str], otherwise: str) -> dict[str, str | None]:
+    """What the finding about an unknown word adds: the one that it is most likely a slip for, else a hint."""
+    near = did_you_mean(word, known)
+    return {"suggestion": near, "hint": None if near else otherwise}
+
+
 @contextmanager
 def bounded_suggestions() -> Iterator[None]:
     """Look for suggestions with a fixed effort only, however many words are misspelt and names are known."""

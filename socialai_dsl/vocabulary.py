@@ -16,7 +16,10 @@ from typing import Final, Literal, get_args
 COLORS: Final = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS: Final = ("right", "down", "left", "up")
 TURNS: Final = ("left", "none", "right")
-SIDES: Final = ("top", "bottom", "left", "right")
+
+Side = Literal["top", "bottom", "left", "right"]
+SIDES: Final[tuple[Side, ...]] = get_args(Side)
+"""The walls of a room."""
 
 Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
 PRIMITIVES: Final[tuple[Primitive, ...]] = get_args(Primitive)

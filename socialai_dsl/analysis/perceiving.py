@@ -216,13 +216,16 @@ def _parts_of(name: str, where: Path, entity: Mapping[str, Any]) -> list[_Part]:
 def _pairs(program: Program, checked: CheckedScenario, rooms: int, seed: int) -> Iterator[_Pair]:
     """For each room and each draw a twin, where the draw has another value that is possible."""
     table = Table([program], 1)
-    drawn = [(k, room) for k in range(rooms) if (room := _redrawn(table, seed, k, {})) is not None]
+    drawn = {k: room for k in range(rooms) if (room := _redrawn(table, seed, k, {})) is not None}
+    if not drawn:
+        return
+    first, *others = drawn.values()
     order = _order_of_places(checked)
-    for part in _parts(drawn[0][1]) if drawn else ():
-        if all(part.value(room) == part.value(drawn[0][1]) for _, room in drawn):
+    for part in _parts(first):
+        if all(part.value(room) == part.value(first) for room in others):
             continue
-        for place, (k, room) in enumerate(drawn):
-            other = _other(part, table, drawn, place, seed)
+        for k, room in drawn.items():
+            other = _other(part, table, drawn, k, rooms, seed)
             if other is None:
                 continue
             twin = part.alone(other, room)
@@ -233,23 +236,23 @@ def _pairs(program: Program, checked: CheckedScenario, rooms: int, seed: int) ->
                 continue
             yield _Pair(k, None, twin, k, part.name, (_only(part.value(room)), _only(other)))
     if not _draws_itself(checked):
-        for k, room in drawn:
+        for k, room in drawn.items():
             yield _Pair(k, room, room, k + rooms, _LATER, ())
 
 
 def _other(
-    part: _Part, table: Table, drawn: Sequence[tuple[int, dict[str, Any]]], place: int, seed: int
+    part: _Part, table: Table, drawn: Mapping[int, dict[str, Any]], k: int, rooms: int, seed: int
 ) -> dict[str, Any] | None:
-    """Another value that a part can have in a room, the one at a place among those drawn; None if none was found."""
-    k, room = drawn[place]
-    other: dict[str, Any] | None
+    """Another value that a part of room k, of so many, can have; None if none was found."""
+    own = part.value(drawn[k])
     for attempt in range(1, _ATTEMPTS + 1):
-        if part.free:
-            _, other = drawn[(place + attempt) % len(drawn)]
-        else:
-            other = _redrawn(table, seed, k + attempt * len(drawn), part.without(room))
-        if other is not None and part.value(other) not in ({}, part.value(room)):
-            return part.value(other)
+        room = (
+            drawn.get((k + attempt) % rooms)
+            if part.free
+            else _redrawn(table, seed, k + attempt * rooms, part.without(drawn[k]))
+        )
+        if room is not None and part.value(room) not in ({}, own):
+            return part.value(room)
     return None
 
 

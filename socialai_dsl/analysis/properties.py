@@ -116,7 +116,7 @@ def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
     plans = loaded.checked.properties
     if loaded.checked.npcs_hidden or any(plan.kind == "knowable" for plan in plans):
         return plans
-    return (*plans, PropertyPlan("knowable", "knowable: true", "", span))
+    return (*plans, PropertyPlan("knowable", "knowable: true", span))
 
 
 def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.checking.loaded import Loaded, guided_options
-from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
@@ -78,10 +78,10 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
         return None
     experiment = shaped.model
     if experiment.profile is not None and experiment.profile not in experiment.profiles:
-        near = did_you_mean(experiment.profile, experiment.profiles)
+        hint = "the file's profiles are " + (", ".join(experiment.profiles) or "none")
+        advice = advice_on(experiment.profile, experiment.profiles, hint)
         message = f"there is no profile `{experiment.profile}`"
-        hint = None if near else "the file's profiles are " + (", ".join(experiment.profiles) or "none")
-        bag.error("S201", message, resolved.tree.value_span(("profile",)), suggestion=near, hint=hint)
+        bag.error("S201", message, resolved.tree.value_span(("profile",)), **advice)
     cells = {
         profile: cells_of(experiment, profile, shaped.tree, bag, whole=not shaped.lost)
         for profile in (None, *experiment.profiles)
@@ -132,7 +132,6 @@ def _check_names(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticB
             name = cell.options.get(option, shipped[0])
             if name in shipped or ":" in name:
                 continue
-            near = did_you_mean(name, shipped)
-            hint = None if near else f"one of {', '.join(shipped)}, or mine:{option.title()}"
+            advice = advice_on(name, shipped, f"one of {', '.join(shipped)}, or mine:{option.title()}")
             span = resolved.tree.value_span(cell.places[option])
-            bag.error("S103", f"`{name}` is not a word for `{option}`", span, suggestion=near, hint=hint)
+            bag.error("S103", f"`{name}` is not a word for `{option}`", span, **advice)

@@ -7,7 +7,14 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
+from socialai_dsl.diagnostics import (
+    Diagnostic,
+    DiagnosticBag,
+    ScenarioError,
+    Severity,
+    advice_on,
+    did_you_mean,
+)
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
@@ -63,10 +70,9 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
             values[name] = default
     for name in resolved.params:
         if name not in declared:
-            near = did_you_mean(name, declared)
-            hint = None if near else "it has " + ", ".join(declared) if declared else "it has none"
+            advice = advice_on(name, declared, "it has " + ", ".join(declared) if declared else "it has none")
             message = f"`{resolved.name}` has no parameter `{name}`"
-            bag.error("S206", message, resolved.param_span(name), suggestion=near, hint=hint)
+            bag.error("S206", message, resolved.param_span(name), **advice)
     return values
 
 
@@ -89,11 +95,10 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
         return default
     labels = list(map(str, choices)) if isinstance(choices, dict | list) else [str(default)]
     if str(default) not in labels:
-        near = did_you_mean(str(default), labels)
+        advice = advice_on(str(default), labels, "one of " + ", ".join(labels))
         span = resolved.tree.value_span(("params", name, "default"))
-        hint = None if near else "one of " + ", ".join(labels)
         message = f"the default of `{name}` is none of its values"
-        bag.error("S206", message, span, suggestion=near, hint=hint)
+        bag.error("S206", message, span, **advice)
     return choices.get(str(default), default) if isinstance(choices, dict) else default
 
 
@@ -102,9 +107,8 @@ def _given(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag:
     text, span = resolved.params[name], resolved.param_span(name)
     if isinstance(choices, dict):
         if text not in choices:
-            near = did_you_mean(text, choices)
-            hint = None if near else "one of " + ", ".join(choices)
-            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, suggestion=near, hint=hint)
+            advice = advice_on(text, choices, "one of " + ", ".join(choices))
+            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, **advice)
         return choices.get(text, default)
     value = read_plain(text).value
     if isinstance(choices, list) and (value not in choices or isinstance(value, bool) != _any_bool(choices)):
@@ -262,25 +266,7 @@ _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 _OF_ALL_VARIANTS = frozenset({"W314", "W317"})
 """What a variant may leave without a use in parts that are there for the others."""
 
-_MAY_FOLLOW = frozenset(
-    {
-        "S105",
-        "S201",
-        "S204",
-        "S205",
-        "S206",
-        "S213",
-        "S301",
-        "S302",
-        "S303",
-        "S304",
-        "S305",
-        "S310",
-        "S315",
-        "S401",
-        "S402",
-    }
-)
+_MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 S310 S315 S401 S402".split())
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
 _OF_WHOLE_FILES = frozenset({"S316"})
@@ -370,10 +356,9 @@ def put_grammar(tree: Node, bag: DiagnosticBag) -> None:
         return
     shared = shared_grammars()
     if named.value not in shared:
-        near = did_you_mean(named.value, shared)
-        hint = None if near else "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
+        hint = "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
         message = f"there is no shared grammar `{named.value}`"
-        bag.error("S201", message, named.value_span(), suggestion=near, hint=hint)
+        bag.error("S201", message, named.value_span(), **advice_on(named.value, shared, hint))
     named.put(shared.get(named.value, next(iter(shared.values()))))
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import gcd, lcm
 
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import Draft, draft_of, meaning_of, naming_the_patch
-from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, advice_on
 from socialai_dsl.loader.members import NODE_KEYS, Member, check_splits, members_of, parameters_of
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.suite import Entry, Split, Suite
 from socialai_dsl.semantics.suite import shared_actions, shared_space
+from socialai_dsl.source import DataPath
 
 
 def check_suite(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedSuite | None:
@@ -65,10 +66,9 @@ def _has_parameters(resolved: ResolvedFile, own: DiagnosticBag) -> bool:
         (name, path) for name, path, values in parameters_of(tree) if not isinstance(values, list | dict)
     ]
     for name, path in wrong:
-        near = did_you_mean(name, NODE_KEYS)
-        hint = None if near else "a parameter has a list or a mapping of values"
+        advice = advice_on(name, NODE_KEYS, "a parameter has a list or a mapping of values")
         message = f"`{name}` is no key of a tree, and no parameter, which has values"
-        own.error("S101", message, resolved.tree.key_span(path), suggestion=near, hint=hint)
+        own.error("S101", message, resolved.tree.key_span(path), **advice)
     return not wrong
 
 
@@ -183,12 +183,9 @@ def _check_parameters(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """A suite has no parameters but its split; members are given theirs in its file."""
     for name in resolved.params:
         if name != "split":
-            near = did_you_mean(name, ["split"])
-            hint = (
-                None if near else "only `?split=NAME`; members get theirs in the file: `dance.yaml?length=2`"
-            )
+            hint = "only `?split=NAME`; members get theirs in the file: `dance.yaml?length=2`"
             message = f"`{resolved.name}` is a suite and has no parameter `{name}`"
-            bag.error("S206", message, resolved.param_span(name), suggestion=near, hint=hint)
+            bag.error("S206", message, resolved.param_span(name), **advice_on(name, ["split"], hint))
 
 
 def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> None:
@@ -196,13 +193,7 @@ def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> N
     for name, split in suite.splits.items():
         _check_split(suite, name, split, resolved, bag)
     if suite.sweep is not None and suite.members is not None:
-        names = _written(suite)
-        for member in suite.sweep:
-            if member not in names:
-                near = did_you_mean(member, names)
-                hint = None if near else "its members are " + ", ".join(names)
-                span = resolved.tree.key_span(("sweep", member))
-                bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
+        _check_named(suite, suite.sweep, ("sweep",), resolved, bag)
     if len(list(bag)) > before:
         return
     try:
@@ -222,13 +213,20 @@ def _check_split(suite: Suite, name: str, split: Split, resolved: ResolvedFile, 
     if split.replace and split.members is not None:
         message = f"the split `{name}` has only one of `replace` and `members`"
         bag.error("S107", message, resolved.tree.key_span(("splits", name, "members")))
-    for member in split.replace if suite.tree is None else ():
-        names = _written(suite)
+    if suite.tree is None:
+        _check_named(suite, split.replace, ("splits", name, "replace"), resolved, bag)
+
+
+def _check_named(
+    suite: Suite, named: Iterable[str], path: DataPath, resolved: ResolvedFile, bag: DiagnosticBag
+) -> None:
+    """Report keys at a path that should be members of the suite."""
+    names = _written(suite)
+    for member in named:
         if member not in names:
-            near = did_you_mean(member, names)
-            hint = None if near else "its members are " + ", ".join(names)
-            span = resolved.tree.key_span(("splits", name, "replace", member))
-            bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
+            advice = advice_on(member, names, "its members are " + ", ".join(names))
+            span = resolved.tree.key_span((*path, member))
+            bag.error("S504", f"`{member}` is no member of this suite", span, **advice)
 
 
 def _written(suite: Suite) -> list[str]:

@@ -278,6 +278,11 @@ Expr = (
 )
 
 
+def options_of(node: Expr) -> tuple[Expr, ...]:
+    """The parts of alternatives; anything else is the only one."""
+    return node.options if isinstance(node, Alternatives) else (node,)
+
+
 def moved(node: Expr, place: Callable[[int], int]) -> Expr:
     """The same tree with every offset changed."""
     offsets: dict[str, Any] = {

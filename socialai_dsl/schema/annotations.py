@@ -174,7 +174,7 @@ _SCALARS: Final = {int: "a whole number", float: "a number", bool: "`true` or `f
 def expectation(annotation: Any) -> str:
     """The expected value, in words."""
     parts = [part for part in branches(annotation) if part is not type(None)]
-    if {int, bool, str} <= set(map(_hashable, parts)):
+    if all(kind in parts for kind in (int, bool, str)):
         return "an expression"
     for part in parts:
         if part in _SCALARS:
@@ -186,7 +186,3 @@ def expectation(annotation: Any) -> str:
         if get_origin(part) in (tuple, list):
             return "a list"
     return "something else"
-
-
-def _hashable(part: Any) -> Any:
-    return part if isinstance(part, type) else str(part)

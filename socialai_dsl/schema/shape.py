@@ -10,7 +10,7 @@ from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.schema.annotations import (
     CALLED,
     annotation_at,
@@ -336,7 +336,8 @@ def model_of(
             missing = [key for key in _STAND_INS if key not in data]
             repaired.lost += [(key,) for key in missing]
             made = _tried(model, data | {key: _STAND_INS[key] for key in missing})
-    return ShapedFile(made, repaired.tree, any(_matters(path) for path in repaired.lost))
+    matters = any(str(path[-1]) not in _INDIFFERENT for path in repaired.lost)
+    return ShapedFile(made, repaired.tree, matters)
 
 
 def _made(model: type[M], data: object) -> M:
@@ -366,15 +367,8 @@ _INDIFFERENT: Final = frozenset(
 )
 """Keys whose loss makes nothing else in the file wrong."""
 
-_BUILDING: Final = (Scenario, Npc)
-"""What can build on another file."""
-
 PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
 """A parameter that is a whole value; known ones of scenarios have been put in before."""
-
-
-def _matters(path: DataPath) -> bool:
-    return str(path[-1]) not in _INDIFFERENT
 
 
 @dataclass(frozen=True)
@@ -386,6 +380,11 @@ class _Finding:
     value: object
     context: Mapping[str, Any]
     about_key: bool
+
+    @property
+    def key(self) -> str:
+        """The key whose value it is, or in whose value; empty where there is none."""
+        return next((str(part) for part in reversed(self.path) if isinstance(part, str)), "")
 
 
 class _Report:
@@ -460,8 +459,8 @@ class _Report:
         span = self._places.key_span(finding.path)
         owner = model_at(self._model, finding.path[:-1])
         known = keys_of(owner) if owner is not None else []
-        if owner in _BUILDING:
-            known = [*known, "extends"]  # which is gone when the models see a file
+        if owner in (Scenario, Npc):
+            known = [*known, _EXTENDS]
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if owner is ThenRule and key == "do":
             message = "the body has already moved when `then` is read: put `do` in the state or in `first`"
@@ -474,7 +473,7 @@ class _Report:
             self._unknown_word(key, owner, called, known, near, span)
         if owner is Register and near == "range" and ".." not in str(finding.value):
             near = None  # `max: 9` is not a range under another name
-        if near is None or near == "extends" or not self._repaired.rename(finding.path, near):
+        if near is None or near == _EXTENDS or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
 
     def _left_over(self, parent: DataPath, key: str, known: list[str]) -> str | None:
@@ -507,7 +506,7 @@ class _Report:
             return
         if finding.path in self._repaired.lost:
             return  # it is there without a value, which has been reported
-        if any(did_you_mean(word, ["extends"]) for word in self._extra.get((), ())):
+        if any(did_you_mean(word, [_EXTENDS]) for word in self._extra.get((), ())):
             return  # the file it builds on may have it
         owner = model_at(self._model, parent)
         if owner is Register and extra:
@@ -557,7 +556,7 @@ class _Report:
                 return
         expected = expectation(annotation_at(self._model, finding.path))
         got = _kind_of(finding.value)
-        key = next((str(part) for part in reversed(finding.path) if isinstance(part, str)), "")
+        key = finding.key
         what = f"`{key}` is {expected}" if key else f"{expected} is expected"
         self._bag.error("S104", f"{what}, here is {got}", span, hint=_cure(key, expected, finding.value))
 
@@ -568,12 +567,9 @@ class _Report:
             message = f"one of {', '.join(words)} is expected, here is {_kind_of(finding.value)}"
             self._bag.error("S104", message, span)
             return
-        near = did_you_mean(finding.value, words)
-        hint = None if near else "one of " + ", ".join(words)
-        key = next((str(part) for part in reversed(finding.path) if isinstance(part, str)), "")
-        self._bag.error(
-            "S103", f"`{finding.value}` is not a word for `{key}`", span, suggestion=near, hint=hint
-        )
+        advice = advice_on(finding.value, words, "one of " + ", ".join(words))
+        message = f"`{finding.value}` is not a word for `{finding.key}`"
+        self._bag.error("S103", message, span, **advice)
 
 
 def _has(part: object, step: object) -> bool:
@@ -609,7 +605,7 @@ def _as_share(value: object, most: object) -> str | None:
 
 def _length(finding: _Finding) -> str:
     context = finding.context
-    key = next((str(part) for part in reversed(finding.path) if isinstance(part, str)), "this")
+    key = finding.key or "this"
     many = "characters" if isinstance(finding.value, str) else "entries"
     if "max_length" in context:
         return f"`{key}` has more than {context['max_length']} {many}"

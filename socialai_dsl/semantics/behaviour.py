@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import addressing, groups, hands, object_facts, rows, texts, those
@@ -32,11 +32,11 @@ from socialai_dsl.semantics.scope import (
     PlayedFrame,
     Scalar,
     Scope,
-    at_every_step,
     described,
     dotted,
     quoted,
     reset_scope,
+    step_scope,
     surviving,
     with_article,
     wrong_count,
@@ -60,9 +60,10 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     all_of,
+    changed,
     entity,
 )
-from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, on_hearing, with_slots
+from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, on_hearing, with_slots
 from socialai_dsl.source import DataPath
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
@@ -167,9 +168,8 @@ def _unknown(
         usage = synonym + (given or "(x)" if takes else "")
         purpose = {"use": "to toggle something ", "enter": "to go through something "}.get(synonym, "")
         return resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
-    near = did_you_mean(name, ACTIVITIES)
-    hint = None if near else "activities are " + ", ".join(ACTIVITIES)
-    return resolver.fail("S205", f"unknown activity `{name}`", node, scope, suggestion=near, hint=hint)
+    advice = advice_on(name, ACTIVITIES, "activities are " + ", ".join(ACTIVITIES))
+    return resolver.fail("S205", f"unknown activity `{name}`", node, scope, **advice)
 
 
 def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
@@ -236,9 +236,8 @@ def effects(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> It
             )
     signature = EFFECTS.get(name)
     if signature is None:
-        near = did_you_mean(name, EFFECTS)
-        hint = None if near else "effects are " + ", ".join(EFFECTS)
-        raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, suggestion=near, hint=hint)
+        advice = advice_on(name, EFFECTS, "effects are " + ", ".join(EFFECTS))
+        raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, **advice)
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     if (which := those.found(subject)) is None:
@@ -350,13 +349,6 @@ def _new_status(
 # -- frames --------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Spoken:
-    """The `say:` of a frame, by the path of the rule or step."""
-
-    lines: dict[DataPath, Line] = field(default_factory=dict)
-
-
 def entries(played: PlayedFrame) -> Iterator[tuple[DataPath, str, Effects]]:
     """Every rule and step of a frame in reading order: its path, its address and itself."""
     base, address = played.path, dotted(played.address)
@@ -372,9 +364,9 @@ def entries(played: PlayedFrame) -> Iterator[tuple[DataPath, str, Effects]]:
         yield (*base, *path), f"{address}.{dotted(path[:-1])}[{step.state or path[-1]}]", step
 
 
-def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
-    """The lines of a member in its frame; resolved first, so that others can hear them."""
-    spoken = Spoken()
+def lines_of(resolver: Resolver, played: PlayedFrame) -> dict[DataPath, Line]:
+    """The lines of a member in its frame, by rule or step; resolved first, so that others can hear them."""
+    lines: dict[DataPath, Line] = {}
     for path, address, entry in entries(played):
         if entry.say is not None:
             with surviving():
@@ -384,23 +376,23 @@ def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
                 if entry.to is not None:
                     own = scope.at((*path, "to"), f"{scope.draws.site.removesuffix('.say')}.to")
                     line = addressing.addressed(resolver, line, entry.to, own)
-                spoken.lines[path] = line
+                lines[path] = line
         elif entry.to is not None:
             span = resolver.findings.places.key_span((*path, "to"))
             resolver.findings.error("S105", "`to` needs `say`: what is said to them", span)
-    return spoken
+    return lines
 
 
 def _scope(played: PlayedFrame, path: DataPath, address: str) -> Scope:
     return Scope(path, Draws(f"{played.member}/{address}"), member=played.member, frame=played)
 
 
-def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
-    """The whole frame of one member."""
+def plan(resolver: Resolver, played: PlayedFrame, lines: Mapping[DataPath, Line]) -> FramePlan:
+    """The whole frame of one member; `lines` are those of `lines_of`."""
     frame = played.model
     span = resolver.findings.places.key_span(played.path)
     addresses = {path: address for path, address, _ in entries(played)}
-    planner = _Planner(resolver, played, spoken, addresses)
+    planner = _Planner(resolver, played, lines, addresses)
     states = tuple(planner.state(name, state) for name, state in (frame.states or {}).items())
     steps = tuple(planner.step(path, step) for path, step in frame.entries())
     start = (frame.start or next(iter(frame.states), "")) if frame.states else ""
@@ -451,7 +443,7 @@ class _Deeds:
         value = texts.value_for(resolver, register, raw, scope)
         targets: list[Term] = []
         if look is not None:
-            targets += rows.looks_set(resolver, look, node, own)
+            targets += rows.looks(resolver, look, node, own)
         elif isinstance(node, ast.Call):
             targets += rows.of_keys(resolver, register, node, own)
         else:
@@ -475,11 +467,8 @@ def _look_named(resolver: Resolver, node: ast.Expr, scope: Scope) -> str | None:
     """The look that is set: `ann.mood`, or in a frame `mood`; None if the name is not that of a look."""
     looks = resolver.symbols.scenario.looks
     if isinstance(node, ast.Attribute) and node.name not in looks:
-        near = did_you_mean(node.name, looks)
-        hint = None if near else "what is set before a dot is a look, declared under `looks:`"
-        raise resolver.fail(
-            "S205", f"nothing here has a `{node.name}`", node, scope, suggestion=near, hint=hint
-        )
+        advice = advice_on(node.name, looks, "what is set before a dot is a look, declared under `looks:`")
+        raise resolver.fail("S205", f"nothing here has a `{node.name}`", node, scope, **advice)
     name = node.name if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
     return name if name in looks else None
 
@@ -490,7 +479,7 @@ class _Planner:
 
     resolver: Resolver
     played: PlayedFrame
-    spoken: Spoken
+    lines: Mapping[DataPath, Line]
     addresses: dict[DataPath, str]
     hearing: bool = False
 
@@ -521,7 +510,7 @@ class _Planner:
         doing = self._activity((*path, "do"), do, address) if do is not None else None
         deeds = self._deeds(address)
         sets, causes = deeds.sets(rule, path), deeds.causes(rule, path)
-        say = self.spoken.lines.get(path)
+        say = self.lines.get(path)
         if asked := asked_of_heard((when, doing, sets, causes, say)):
             heard = with_slots(self.resolver, heard, asked, self.resolver.findings.at((*path, "hears")))
         patterns = tuple(pattern for alternative in heard for pattern, _ in alternative)
@@ -549,7 +538,8 @@ class _Planner:
         if patterns:
             self.resolver.readings.change(f"{plan.site}.when", binding(heard))
         self.resolver.readings.entries[plan.site] = rule
-        return bound(plan, heard)
+        bound: RulePlan = changed(plan, binding(heard))
+        return bound
 
     def _hears(self, rule: Rule, path: DataPath, address: str) -> list[Alternative]:
         """What `hears:` waits for: the patterns of each of its texts."""
@@ -619,20 +609,17 @@ class _Planner:
             what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
             cure = "only what the frame declares in its own `let`, or the scenario in `state`, can be set"
             raise findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
-        near = did_you_mean(name, [*self.played.model.let, *symbols.scenario.state])
-        hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
-        raise findings.fail(
-            "S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint
-        )
+        hint = f"declare it: `let: {{{name}: 0}}` in the frame"
+        advice = advice_on(name, [*self.played.model.let, *symbols.scenario.state], hint)
+        raise findings.fail("S305", f"`{name}` is not declared in this frame's `let`", span, **advice)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:
         states = self.played.model.states or {}
         if target is not None and target not in states:
             findings = self.resolver.findings
-            near = did_you_mean(target, states)
+            advice = advice_on(target, states, "its states are " + ", ".join(states))
             message = f"no state `{target}` in frame `{self.played.name}`"
-            hint = None if near else "its states are " + ", ".join(states)
-            findings.error("S301", message, findings.at(path, 0, len(target)), suggestion=near, hint=hint)
+            findings.error("S301", message, findings.at(path, 0, len(target)), **advice)
         return target
 
     def step(self, written: DataPath, step: Step) -> StepPlan:
@@ -662,7 +649,7 @@ class _Planner:
             lasted=lasted,
             sets=self._deeds(address).sets(step, path),
             causes=self._deeds(address).causes(step, path),
-            say=self.spoken.lines.get(path),
+            say=self.lines.get(path),
         )
 
     def _duration(self, path: DataPath, raw: object, site: str) -> tuple[int | None, SitedTerm | None]:
@@ -718,11 +705,11 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     when: SitedTerm | None = None
     with surviving():
         if rule.when is not None:
-            when = resolver.sited(rule.when, BOOL, _world_scope((*path, "when"), f"{name}.when"))
+            when = resolver.sited(rule.when, BOOL, step_scope((*path, "when"), f"{name}.when"))
     resolver.readings.entries[name] = rule
     deeds = _Deeds(
         resolver,
-        lambda path, part: _world_scope(path, f"{name}.{part}"),
+        lambda path, part: step_scope(path, f"{name}.{part}"),
         lambda path, word: _register_of_the_world(resolver, path, word),
     )
     return RulePlan(
@@ -755,10 +742,6 @@ def _register_of_the_world(resolver: Resolver, path: DataPath, word: str) -> str
     hint = None if near or word in resolver.symbols.declared else f"declare it: `state: {{{word}: 0}}`"
     message = f"`{word}` is not declared in `state`"
     raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
-
-
-def _world_scope(path: DataPath, site: str) -> Scope:
-    return at_every_step(reset_scope(path, site))
 
 
 def requirements(resolver: Resolver) -> Iterator[SitedTerm]:

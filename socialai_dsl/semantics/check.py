@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
-from typing import Final, Literal, get_args
+from typing import Final, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
@@ -29,6 +30,7 @@ from socialai_dsl.semantics.plans import (
     Drawn,
     FramePlan,
     OutcomePlan,
+    PropertyKind,
     PropertyPlan,
     RulePlan,
     StepPlan,
@@ -48,10 +50,8 @@ from socialai_dsl.semantics.scope import (
     Findings,
     PlayedFrame,
     Scalar,
-    at_every_step,
-    dotted,
     frames_of,
-    reset_scope,
+    step_scope,
     surviving,
 )
 from socialai_dsl.semantics.setup import room_plan, room_sizes
@@ -62,14 +62,12 @@ from socialai_dsl.semantics.terms import (
     Quantification,
     SitedTerm,
     Type,
-    walk,
 )
 from socialai_dsl.semantics.texts import words_in_order
 from socialai_dsl.source import DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES
 
-_Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
-KINDS: tuple[_Kind, ...] = get_args(_Kind)
+KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
 
 _WITH = {"share": ("reachable", "within", "script", "needs", "knowable"), "draw": ("needs",)}
@@ -100,9 +98,7 @@ class _Entry:
         """The entry with everything resolved."""
         kind, entry = self._kind(), self._entry
         place = (*self._path, kind)
-        plan = PropertyPlan(
-            kind, "", dotted(self._path), self._findings.places.key_span(place), share=entry.share
-        )
+        plan = PropertyPlan(kind, "", self._findings.places.key_span(place), share=entry.share)
         match kind:
             case "reachable" | "never":
                 raw = entry.reachable if kind == "reachable" else entry.never
@@ -140,7 +136,7 @@ class _Entry:
                 text = f"only_through: {word} by {', '.join(members)}"
                 return replace(plan, text=text, members=members, draws=((path, values),))
 
-    def _kind(self) -> _Kind:
+    def _kind(self) -> PropertyKind:
         given = [kind for kind in KINDS if getattr(self._entry, kind) is not None]
         if len(given) != 1:
             listed = ", ".join(f"`{kind}`" for kind in KINDS)
@@ -156,14 +152,10 @@ class _Entry:
 
     def _condition(self, path: DataPath, raw: Expression) -> tuple[SitedTerm, tuple[Drawn, ...]]:
         """A condition, and what it alone asks about the step before."""
-        remembered = self._resolver.registers.remembered
-        asked = len(remembered)
-        try:
-            condition = self._resolver.sited(raw, BOOL, at_every_step(reset_scope(path)))
-            used = {part.path for part in walk(condition) if hasattr(part, "path")}
-            own = tuple(drawn for drawn in remembered if drawn.path in used)
-        finally:
-            del remembered[asked:]
+        registers = self._resolver.registers
+        with registers.apart():
+            condition = self._resolver.sited(raw, BOOL, step_scope(path))
+            own = registers.remembered_in(condition)
         return self._resolver.undrawn(condition, "a property draws nothing itself"), own
 
     def _members(self, path: DataPath, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -248,7 +240,12 @@ class Ranges:
         self._growth: dict[str, int] = {}
         self._rounds = 0
         self._wide: dict[str, Type] | None = None
-        self._steps = scenario.horizon * _setters(scenario)
+        followed = Counter(member.frame for member in scenario.members().values())
+        setters = sum(bool(rule.set) for rule in scenario.rules)
+        for path, frame in frames_of(scenario):
+            own = sum(bool(entry.set) for entry in frame.all_effects())
+            setters += own * max(1, followed[str(path[-1])])
+        self._steps = scenario.horizon * setters
 
     def settled(self, needed: Mapping[str, Type]) -> bool:
         """Take note of the ranges that a resolution asked for; whether it had them already."""
@@ -300,19 +297,6 @@ def _excess(type_: Type, range_: Type | None) -> int:
     return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
 
 
-def _setters(scenario: Scenario) -> int:
-    """How many rules and steps set something."""
-    rules = [
-        rule
-        for frame in scenario.frames.values()
-        for state in (frame.states or {}).values()
-        for rule in state.rules
-    ]
-    steps = [step for frame in scenario.frames.values() for _, step in frame.entries()]
-    own = sum(bool(entry.set) for entry in (*rules, *steps))
-    return own + sum(bool(rule.set) for rule in scenario.rules)
-
-
 # -- the whole scenario --------------------------------------------------------------------------------------
 
 
@@ -347,7 +331,6 @@ def check_meaning(
         places: where the parts of the file stand.
         bag: takes the findings.
         prelude: object types.
-        data: the document the models were made from.
         params: the values of the file's parameters.
     """
     words: dict[str, Type] = {}
@@ -357,7 +340,7 @@ def check_meaning(
         found = DiagnosticBag()
         findings = Findings(found, places, params or {})
         if AGENT not in scenario.cast:
-            _no_agent(scenario, findings, places)
+            _no_agent(scenario, findings)
             break
         run = _Run(scenario, findings, prelude, words, ranges.now)
         checked = run.checked(name)
@@ -378,9 +361,9 @@ def check_meaning(
     return None if found.has_errors else checked
 
 
-def _no_agent(scenario: Scenario, findings: Findings, places: Node) -> None:
+def _no_agent(scenario: Scenario, findings: Findings) -> None:
     """There is nobody to act; perhaps because the name is misspelt."""
-    message = "the cast has no `agent`"
+    message, places = "the cast has no `agent`", findings.places
     if (near := did_you_mean(AGENT, scenario.cast)) is not None:
         findings.error("S105", f"{message}, but `{near}`", places.key_span(("cast", near)), suggestion=AGENT)
     else:
@@ -401,24 +384,6 @@ def _without_consequences(findings: Findings, scenario: Scenario) -> Iterator[Di
     if any(d.severity is Severity.ERROR and d.code != "S318" for d in found):
         follow.add("S318")  # what is put into a register may be what is wrong
     return (d for d in found if d.code not in follow)
-
-
-def _definitions(scenario: Scenario) -> Iterator[DataPath]:
-    """Where the definitions of a scenario and of its frames stand."""
-    yield from (("define", key) for key in scenario.define)
-    for path, frame in frames_of(scenario):
-        yield from ((*path, "define", key) for key in frame.define)
-
-
-@dataclass(frozen=True)
-class _Spoken:
-    """What the members say: by member, the frame it plays and its lines."""
-
-    frames: dict[str, behaviour.Spoken]
-
-    def lines(self, members: Iterable[str]) -> dict[str, list[Line]]:
-        """Member -> its lines in the order of its frame."""
-        return {name: list(self.frames[name].lines.values()) for name in members if name in self.frames}
 
 
 class _Run:
@@ -484,11 +449,8 @@ class _Run:
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
         asked = probes(resolver)
-        for rule in rules:
-            self._look_at_size(rule)
-        for plan in plans:
-            for one in plan.causing:
-                self._look_at_size(one)
+        for one in (*rules, *(one for plan in plans for one in plan.causing)):
+            self._look_at_size(one)
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -498,7 +460,7 @@ class _Run:
         words = words_in_order(
             self._symbols.sentences,
             names,
-            spoken.lines(member for member in self._symbols.cast if member != AGENT),
+            [line for npc in self._symbols.cast if npc != AGENT for line in spoken.get(npc, {}).values()],
             [one.tone for one in inhabitants],
         )
         return CheckedScenario(
@@ -525,7 +487,7 @@ class _Run:
             require=required,
             egocentric=scenario.observe.directions == "egocentric",
             slope=self._slope(),
-            beliefs=tuple(believed),
+            beliefs=believed,
             channels=self._channels(),
             shows_carrying=self._shows_carrying(),
             looks=tuple(rows.look_plans(resolver)) if scenario.looks else (),
@@ -557,11 +519,11 @@ class _Run:
             return False  # a slot that cannot be filled, which has been reported
         return not slots or possible.check_slots_of_grammar(self._symbols.sentences, self._findings)
 
-    def _spoken(self) -> _Spoken:
-        """What everybody says, before what anybody hears."""
+    def _spoken(self) -> dict[str, dict[DataPath, Line]]:
+        """What everybody says, before what anybody hears: member -> the lines of its frame."""
         found = {member: behaviour.lines_of(self.resolver, played) for member, played in self._played.items()}
         for member, spoken in found.items():
-            for line in spoken.lines.values():
+            for line in spoken.values():
                 if number_of_texts(line) > MAX_TEXTS:
                     message = f"this can be {number_of_texts(line)} different texts; at most {MAX_TEXTS} are possible"
                     self._findings.error("S212", message, line.span)
@@ -570,13 +532,13 @@ class _Run:
         for member, played in self._played.items():
             if member != AGENT and performs(played.model):
                 self.resolver.utterances.add_npc_texts(member, self.resolver.utterances.all_texts())
-        return _Spoken(found)
+        return found
 
-    def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:
+    def _plans(self, spoken: Mapping[str, Mapping[DataPath, Line]]) -> Iterator[FramePlan]:
         # Members act in the order of their entities: the agent, then the cast as written.
         for member, number in sorted(self._symbols.numbers.items(), key=itemgetter(1)):
             if member in self._played:
-                yield behaviour.plan(self.resolver, self._played[member], spoken.frames[member])
+                yield behaviour.plan(self.resolver, self._played[member], spoken[member])
             elif self._symbols.cast[member].beliefs:
                 span = self._findings.places.key_span(("cast", member))
                 yield object_facts.watching(member, number, span)
@@ -606,7 +568,8 @@ class _Run:
         paths: list[DataPath] = [
             *(("let", key) for key in drawn),
             *(("tables", key) for key in scenario.tables),
-            *_definitions(scenario),
+            *(("define", key) for key in scenario.define),
+            *((*path, "define", key) for path, frame in frames_of(scenario) for key in frame.define),
         ]
         parts: list[DataPath] = [(name,) for name in scenario.model_fields_set]
         if len({places.key_span(path).file for path in (*parts, *paths)}) > 1:
@@ -618,11 +581,9 @@ class _Run:
                 self._findings.warning("W317", f"nothing uses `{name}`", places.key_span(path), hint=hint)
 
     def _look_at(self, frame: PlayedFrame) -> None:
-        remembered = self.resolver.registers.remembered
-        asked = len(remembered)
-        entities.declare_frame(self.resolver, frame)
-        behaviour.plan(self.resolver, frame, behaviour.lines_of(self.resolver, frame))
-        del remembered[asked:]  # what only this frame asks about the step before is asked by nobody
+        with self.resolver.registers.apart():
+            entities.declare_frame(self.resolver, frame)
+            behaviour.plan(self.resolver, frame, behaviour.lines_of(self.resolver, frame))
 
     def _outcomes(self) -> Iterator[OutcomePlan]:
         findings = self._findings
@@ -630,17 +591,13 @@ class _Run:
             given = [key for key in ("success", "failure") if getattr(outcome, key) is not None]
             path: DataPath = ("outcome", i)
             if len(given) != 1:
-                code, what = ("S107", "has only one of") if given else ("S105", "needs")
-                message = (
-                    f"an outcome {what} `success` and `failure`"
-                    if given
-                    else "an outcome needs `success` or `failure`"
-                )
-                findings.error(code, message, findings.places.value_span(path))
+                joined = "has only one of `success` and" if given else "needs `success` or"
+                message = f"an outcome {joined} `failure`"
+                findings.error("S107" if given else "S105", message, findings.places.value_span(path))
                 continue
             kind = given[0]
             with surviving():
-                scope = at_every_step(reset_scope((*path, kind)))
+                scope = step_scope((*path, kind))
                 condition = self.resolver.sited(getattr(outcome, kind), BOOL, scope)
                 line = findings.places.key_span((*path, kind)).line
                 self.resolver.readings.entries[condition.site] = outcome
@@ -653,7 +610,7 @@ class _Run:
 
     def _reward(self, raw: Expression, path: DataPath) -> tuple[int, SitedTerm | None]:
         """Per cent of the success reward, or what computes it."""
-        reward = self.resolver.sited(raw, INT, at_every_step(reset_scope(path)))
+        reward = self.resolver.sited(raw, INT, step_scope(path))
         if not isinstance(reward.term, Const):
             return 100, reward
         if not 0 <= reward.term.value <= 100:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics.resolver import INT, Resolver, same_kind
+from socialai_dsl.semantics.resolver import INT, SAYABLE, Resolver, same_kind
 from socialai_dsl.semantics.scope import Draws, FailedError, Scope, common_type, described, quoted, spoken
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -23,7 +23,6 @@ from socialai_dsl.semantics.terms import (
     numbers_of,
 )
 
-_SAYABLE: Final = ("text", "noun", "color", "int", "status", "look", "direction", "action")
 _MOST_WORDS: Final = 256
 """The most texts that one value may be read as, where another is a text."""
 
@@ -80,8 +79,8 @@ def _of_one_type(resolver: Resolver, node: ast.Expr, branches: list[_Branch], sc
     kinds = {branch.value.type.kind for branch in branches}
     if kinds == {"int", "noun"}:
         return [replace(b, value=resolver.fit(b.value, INT, b.node, scope)) for b in branches]
-    if "text" in kinds and kinds <= {*_SAYABLE}:
-        return _as_texts(resolver, node, branches, scope)
+    if "text" in kinds and kinds <= {*SAYABLE}:
+        return _as_texts(resolver, branches, scope)
     first = branches[0]
     for other in branches[1:]:
         if not same_kind(other.value.type, first.value.type):
@@ -124,21 +123,16 @@ def _needed(value: Term) -> Term:
 # -- texts, which have words of their own ----------------------------------------------------------------------
 
 
-def _as_texts(resolver: Resolver, node: ast.Expr, branches: list[_Branch], scope: Scope) -> list[_Branch]:
+def _as_texts(resolver: Resolver, branches: list[_Branch], scope: Scope) -> list[_Branch]:
     """The same with every value a text, of a type that has the words of all."""
     words: dict[str, None] = {}
     for branch in branches:
         if branch.value.type.size > _MOST_WORDS:
             message = f"`{quoted(branch.node)}` can be {branch.value.type.size} numbers, too many to be texts"
             raise resolver.fail("S204", message, branch.node, scope, hint="bound it: `min(..., 99)`")
-        words |= dict.fromkeys(_words(branch.value))
+        words |= {spoken(branch.value.type, value): None for value in numbers_of(branch.value)}
     type_ = Type("text", 0, len(words) - 1, tuple(words))
     return [replace(branch, value=_as_text(branch.value, type_)) for branch in branches]
-
-
-def _words(term: Term) -> list[str]:
-    values = numbers_of(term)
-    return [spoken(term.type, value) for value in values]
 
 
 def _as_text(term: Term, type_: Type) -> Term:

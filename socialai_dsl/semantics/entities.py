@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field, replace
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import (
     CastMember,
@@ -32,13 +32,13 @@ from socialai_dsl.semantics.scope import (
     PlayedFrame,
     Scope,
     Symbols,
-    at_every_step,
     dotted,
     frames_of,
     is_nothing,
     parse_define,
     reset_scope,
     select,
+    step_scope,
     surviving,
     with_article,
 )
@@ -143,9 +143,8 @@ def _roles(scenario: Scenario, findings: Findings) -> dict[str, str]:
             continue
         span = findings.at(("cast", name, "role"), 0, len(role))
         if role not in scenario.roles:
-            near = did_you_mean(role, scenario.roles)
-            hint = None if near else "roles are declared under `roles:`"
-            findings.no_such(role, f"unknown role `{role}`", span, suggestion=near, hint=hint)
+            advice = advice_on(role, scenario.roles, "roles are declared under `roles:`")
+            findings.no_such(role, f"unknown role `{role}`", span, **advice)
         elif name != name.partition("[")[0]:
             message = f"a role is played by one member of the cast; `{name.partition('[')[0]}` is a group"
             if name.endswith("[0]"):
@@ -179,12 +178,9 @@ def _count(count: int | None, at: Items[object] | None) -> int | None:
 
 def _probably(name: str, types: Mapping[str, ObjectType], findings: Findings, path: DataPath) -> ObjectType:
     """The type that was meant by a name that is none, which is reported."""
-    near = did_you_mean(name, types)
-    hint = None if near else "types are " + ", ".join(types)
-    findings.error(
-        "S309", f"unknown object type `{name}`", findings.at(path, 0, len(name)), suggestion=near, hint=hint
-    )
-    return types[near] if near else next(iter(types.values()))
+    advice = advice_on(name, types, "types are " + ", ".join(types))
+    findings.error("S309", f"unknown object type `{name}`", findings.at(path, 0, len(name)), **advice)
+    return types[advice["suggestion"]] if advice["suggestion"] else next(iter(types.values()))
 
 
 def _defines(written: Mapping[str, object], path: DataPath, findings: Findings) -> dict[str, Define]:
@@ -351,7 +347,7 @@ def check_slots(resolver: Resolver) -> None:
         for slot, paths in played.texts.items():
             for which, path in enumerate(paths or ()):
                 filled = resolver.symbols.alternatives[member][which].with_[slot]
-                scope = at_every_step(reset_scope(path, f"cast.{member}.with.{slot}", member))
+                scope = step_scope(path, f"cast.{member}.with.{slot}", member)
                 with surviving():
                     if played.model.slots[slot] == "bool":
                         slot_truth(resolver, slot, filled, scope)
@@ -627,8 +623,8 @@ def _objects(
             type=objects.type,
             status=status if isinstance(status, int) else objects.type.initial,
             initial=None if isinstance(status, int) else status,
-            unlocks=resolver.unlocks.get(number, ()),
-            opens=resolver.opens.get(number, ()),
+            unlocks=object_facts.links(resolver, object_facts.UNLOCKS).get(number, ()),
+            opens=object_facts.links(resolver, object_facts.OPENS).get(number, ()),
             timer=described.timer or 0,
             exclusive=tuple(objects.numbers) if described.exclusive else (),
             pushed_by_rolling=rolled,
@@ -652,9 +648,8 @@ def _pushed_by_rolling(resolver: Resolver, objects: Objects) -> bool:
     elif pusher not in types or not types[pusher].rolls:
         rolling = [name for name, type_ in types.items() if type_.rolls]
         message = f"`{pusher}` does not roll, so it pushes nothing"
-        near = did_you_mean(pusher, rolling)
-        hint = None if near else "what rolls: " + ", ".join(rolling)
-        findings.error("S204", message, span, suggestion=near, hint=hint)
+        advice = advice_on(pusher, rolling, "what rolls: " + ", ".join(rolling))
+        findings.error("S204", message, span, **advice)
     return True
 
 

@@ -8,7 +8,7 @@ from itertools import product
 from math import prod
 from typing import Any, Final
 
-from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, advice_on
 from socialai_dsl.schema.annotations import annotation_at, literals
 from socialai_dsl.schema.experiment import OPTIONS as KEYS
 from socialai_dsl.schema.experiment import (
@@ -45,7 +45,6 @@ class Cell:
         options: those of `OPTIONS` that are given.
         tests: scenarios played besides, with all variants -> what was found elsewhere.
         reference: what was found elsewhere on the scenario itself.
-        place: where the condition stands in the file.
         places: setting -> where its value stands.
     """
 
@@ -60,7 +59,6 @@ class Cell:
     options: Mapping[str, Any]
     tests: Mapping[str, Reference | None]
     reference: Reference | None
-    place: DataPath
     places: Mapping[str, DataPath]
 
     @property
@@ -204,10 +202,10 @@ class _Expansion:
                 yield label, _Layer(value, (*place, key))
                 continue
             if name not in Settings.model_fields:
-                near = did_you_mean(name, Settings.model_fields)
+                hint = "or give each label its settings: `{label: {net: fast, envs: 64}}`"
+                advice = advice_on(name, Settings.model_fields, hint)
                 message = f"an axis with plain values is named after a setting, and `{name}` is none"
-                hint = None if near else "or give each label its settings: `{label: {net: fast, envs: 64}}`"
-                self._bag.error("S101", message, self._places.key_span(place), suggestion=near, hint=hint)
+                self._bag.error("S101", message, self._places.key_span(place), **advice)
                 self._lost = True
                 return
             made = self._plain(name, value, (*place, key))
@@ -223,9 +221,8 @@ class _Expansion:
         words = [str(word) for word in literals(annotation_at(Settings, (name,)))]
         span = self._places.value_span(place)
         if words and isinstance(value, str):
-            near = did_you_mean(value, words)
-            hint = None if near else "one of " + ", ".join(words)
-            self._bag.error("S103", f"`{value}` is not a word for `{name}`", span, suggestion=near, hint=hint)
+            advice = advice_on(value, words, "one of " + ", ".join(words))
+            self._bag.error("S103", f"`{value}` is not a word for `{name}`", span, **advice)
         else:
             self._bag.error("S104", f"`{value}` is no value of `{name}`: {made}", span)
         return None
@@ -261,22 +258,18 @@ class _Expansion:
             path = (*place, "where", key)
             if not there:
                 keys = list(dict.fromkeys(word for k in known for word in k))
-                near = did_you_mean(key, keys)
-                hint = None if near else "one of " + ", ".join(keys)
+                advice = advice_on(key, keys, "one of " + ", ".join(keys))
                 message = f"no condition has a `{key}`"
-                self._bag.error("S701", message, self._places.key_span(path), suggestion=near, hint=hint)
+                self._bag.error("S701", message, self._places.key_span(path), **advice)
                 reported = True
                 continue
             for number, value in enumerate(values):
                 if value in there:
                     continue
                 words = list(dict.fromkeys(word for word in there if word is not None))
-                near = did_you_mean(value, words)
+                advice = advice_on(value, words, "one of " + ", ".join(words[:12]))
                 span = self._places.value_span((*path, number))
-                hint = None if near else "one of " + ", ".join(words[:12])
-                self._bag.error(
-                    "S701", f"no condition has the {key} `{value}`", span, suggestion=near, hint=hint
-                )
+                self._bag.error("S701", f"no condition has the {key} `{value}`", span, **advice)
                 reported = True
         return reported
 
@@ -320,7 +313,6 @@ class _Expansion:
                 for name, reference in map(_tested, given.get("tests", ()))
             },
             given.get("reference"),
-            draft.place,
             places,
         )
 

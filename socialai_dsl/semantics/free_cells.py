@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from itertools import product
 from random import Random
@@ -18,6 +18,7 @@ from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Const, Term, compute, walk
+from socialai_dsl.vocabulary import SIDES
 
 EXACT: Final = frozenset({"column", "row", "rect"})
 """Regions that name their cells: what may overlap can be put there where the room builds something, too."""
@@ -227,28 +228,25 @@ class _Room:
         self.size = size
         self._effort = effort
         self.placings = [item for item in checked.setup if isinstance(item, Placing)]
-        self._places = _Places(self.placings)
+        numbers: dict[object, int] = {}
+        self._kinds = [numbers.setdefault(_place_of(placing), len(numbers)) for placing in self.placings]
+        self._examples = [self.placings[self._kinds.index(kind)] for kind in numbers.values()]
         self.unknown: set[int] = set()
-        self._cells: dict[int, tuple[int, int]] = {}
         self._counted = 0
         self._put_down: Counter[int] = Counter()
-        self._before: dict[int, list[int]] = {}
-        self._shared: dict[tuple[int, int], bool] = {}
-        self._homes_of: dict[int, set[Cell] | None] = {}
-        self._kept: dict[int, tuple[set[Cell] | None, int, set[Cell], int]] = {}
+        self.cells_for = cache(self._cells_for)
+        self.rivals = cache(self._rivals)
+        self._room_of = cache(self._room_of_kind)
+        self._known_homes = cache(self._homes_of_kind)
+        self._may_share = cache(self._meets)
 
-    def cells_for(self, number: int) -> tuple[int, int]:
+    def _cells_for(self, number: int) -> tuple[int, int]:
         """The most cells that a placement can have, and the fewest it has in the least favourable room.
 
         Where the fewest cannot be told, it is taken to be 1.
         """
-        if number not in self._cells:
-            self._cells[number] = self._cells_for(number)
-        return self._cells[number]
-
-    def _cells_for(self, number: int) -> tuple[int, int]:
         try:
-            cells, least, kept, excluded = self._room_for(number)
+            cells, least, kept, excluded = self._room_of(self._kinds[number])
             if cells is not None:
                 least = len(kept)
             if least == 0:
@@ -262,16 +260,13 @@ class _Room:
         most = len(kept) - (self._surely_taken(number, kept) if len(rivals) >= len(kept) else 0)
         return max(0, most), least - excluded - len(rivals)
 
-    def _room_for(self, number: int) -> tuple[set[Cell] | None, int, set[Cell], int]:
-        """Of a placement's kind of place: its cells and the fewest it has; those that its conditions leave and the most
-        that they take away.
+    def _room_of_kind(self, kind: int) -> tuple[set[Cell] | None, int, set[Cell], int]:
+        """Of a kind of place: its cells and the fewest it has; those that its conditions leave and the most that they
+        take away.
         """
-        kind = self._places.kinds[number]
-        if kind not in self._kept:
-            placing = self.placings[number]
-            cells, least = self._region_cells(placing)
-            self._kept[kind] = (cells, least, *self._conditions(placing.where, cells))
-        return self._kept[kind]
+        placing = self._examples[kind]
+        cells, least = self._region_cells(placing)
+        return cells, least, *self._conditions(placing.where, cells)
 
     def _surely_taken(self, number: int, cells: set[Cell]) -> int:
         """How many of these cells are taken in every room: what must be on one of them is on one of its own."""
@@ -279,46 +274,33 @@ class _Room:
         while self._counted < number:
             placing = self.placings[self._counted]
             if not (_is_sure(placing) or placing.overlap) and self.cells_for(self._counted)[1] > 0:
-                self._put_down[self._places.kinds[self._counted]] += 1
+                self._put_down[self._kinds[self._counted]] += 1
             self._counted += 1
-        return sum(count for kind, count in self._put_down.items() if self._is_within(kind, cells))
+        homes = ((self._known_homes(kind), count) for kind, count in self._put_down.items())
+        return sum(count for known, count in homes if known is not None and known <= cells)
 
-    def _is_within(self, kind: int, cells: set[Cell]) -> bool:
-        homes = self._known_homes(kind)
-        return homes is not None and homes <= cells
-
-    def _known_homes(self, kind: int) -> set[Cell] | None:
-        """Where what has this place can be; None if that is only known in a drawn room."""
-        if kind not in self._homes_of:
-            try:
-                self._homes_of[kind] = self._homes(self._places.examples[kind])
-            except UnknownError:
-                self._homes_of[kind] = None
-        return self._homes_of[kind]
+    def _homes_of_kind(self, kind: int) -> set[Cell] | None:
+        """Where what has this kind of place can be; None if that is only known in a drawn room."""
+        try:
+            return self._homes(self._examples[kind])
+        except UnknownError:
+            return None
 
     def has_cells(self, number: int) -> bool:
         """Whether an empty room has a cell for a placement."""
-        cells, least, kept, _ = self._room_for(number)
+        cells, least, kept, _ = self._room_of(self._kinds[number])
         return least > 0 and (cells is None or bool(kept))
 
-    def rivals(self, number: int) -> list[int]:
-        """The entities that are put down before and may lie on a cell of this placement."""
-        if number not in self._before:
-            self._before[number] = self._rivals(number)
-        return self._before[number]
-
     def _rivals(self, number: int) -> list[int]:
-        placing, kinds = self.placings[number], self._places.kinds
+        """The entities that are put down before and may lie on a cell of this placement."""
+        placing, kinds = self.placings[number], self._kinds
         if placing.overlap:
             return []
-        cells, _, kept, _ = self._room_for(number)
+        cells, *_ = self._room_of(kinds[number])
         self._effort.spend(number // 8)
         # What a place lies around is not in it.
         around = {arg.value for region in placing.regions for arg in region.args if isinstance(arg, Const)}
-        sharing = {
-            kind: self._may_share(kind, kinds[number], kept if cells is not None else None)
-            for kind in set(kinds[:number])
-        }
+        sharing = {kind: self._may_share(kind, kinds[number]) for kind in set(kinds[:number])}
         return [
             other.entity
             for other, kind in zip(self.placings[:number], kinds, strict=False)
@@ -356,14 +338,11 @@ class _Room:
     def _fixed(self, region: Region, overlap: bool) -> set[Cell]:
         """Cells of a region that only the size decides, without those where something built is in the way."""
         if region.name == "wall":
-            return self._wall(region)
+            width, height = self.size
+            # Of a wall that is drawn, the shorter is looked at.
+            return wall_cells(region, self.size, region.side or ("top" if width <= height else "left"))
         inside = self._inside(region)
         return inside if overlap and region.name in EXACT else inside - self._built
-
-    def _wall(self, region: Region) -> set[Cell]:
-        width, height = self.size
-        # Of a wall that is drawn, the shorter is looked at.
-        return wall_cells(region, self.size, region.side or ("top" if width <= height else "left"))
 
     def _least_around(self, region: Region) -> int:
         """How many floor cells there are at least next to, or in front of, something."""
@@ -406,31 +385,18 @@ class _Room:
                 excluded += _taken_away(part)
         return kept, excluded
 
-    def _may_share(self, other: int, own: int, cells: set[Cell] | None) -> bool:
-        """Whether what has one kind of place may lie on the cells of another kind (None: any floor cell)."""
-        if (other, own) not in self._shared:
-            placing, homes = self._places.examples[other], self._known_homes(other)
-            absent = placing.nowhere or placing.inside is not None
-            self._effort.spend(len(homes or ()) // 16 + 1)
-            meets = homes is None or bool(homes & (self._floor if cells is None else cells))
-            self._shared[other, own] = meets and not absent
-        return self._shared[other, own]
-
-
-class _Places:
-    """The different places that things are put in.
-
-    Attributes:
-        kinds: of each placement, the number of its place. examples: of each place, something that is put there.
-    """
-
-    def __init__(self, placings: Sequence[Placing]) -> None:
-        numbers: dict[object, int] = {}
-        self.kinds = [numbers.setdefault(_place_of(placing), len(numbers)) for placing in placings]
-        self.examples = [placings[self.kinds.index(kind)] for kind in range(len(numbers))]
+    def _meets(self, other: int, own: int) -> bool:
+        """Whether what has one kind of place may lie on the cells of another kind."""
+        placing, homes = self._examples[other], self._known_homes(other)
+        cells, _, kept, _ = self._room_of(own)
+        absent = placing.nowhere or placing.inside is not None
+        self._effort.spend(len(homes or ()) // 16 + 1)
+        meets = homes is None or bool(homes & (self._floor if cells is None else kept))
+        return meets and not absent
 
 
 def _place_of(placing: Placing) -> object:
+    """The kind of place that something is put in."""
     inside = placing.nowhere or placing.inside is not None
     return placing.at, placing.regions, placing.where, inside, placing.overlap
 
@@ -467,8 +433,6 @@ _FEWEST: Final = 20
 _EFFORT: Final = 300_000
 """How many parts of terms are computed, over all rooms."""
 
-_SIDES: Final = ("top", "bottom", "left", "right")
-
 
 def check_absences(checked: CheckedScenario, findings: Findings, undecided: Collection[int]) -> None:
     """Report who is put outside of the room (S602 in all rooms, W603 in some), and who of the `undecided` entities has
@@ -481,19 +445,17 @@ def check_absences(checked: CheckedScenario, findings: Findings, undecided: Coll
         if placing.at is not None and (share := _outside(placing.at, checked)):
             _report_outside(checked, findings, placing, share)
             told.add(checked.entities[placing.entity].key)
-    found = _tried(checked) if asked else _Found(0, Counter())
-    for placing in asked if found.rooms >= _FEWEST else ():
-        key, absent = checked.entities[placing.entity].key, found.absent[placing.entity]
+    rooms, absences = _tried(checked) if asked else (0, Counter[int]())
+    for placing in asked if rooms >= _FEWEST else ():
+        key, absent = checked.entities[placing.entity].key, absences[placing.entity]
         if key in told or not absent:
             continue
         told.add(key)
-        if absent == found.rooms:
+        if absent == rooms:
             hint = "its `where` never holds there; widen its place, or the room"
             findings.error("S601", f"`{key}` has no free cell in any room", placing.span, hint=hint)
         elif not checked.require:  # rooms that miss a member may be among those that are drawn again
-            message = (
-                f"`{key}` has no free cell, and so is absent, in {_percent(absent / found.rooms)} of rooms"
-            )
+            message = f"`{key}` has no free cell, and so is absent, in {_percent(absent / rooms)} of rooms"
             hint = "widen its place, place it earlier (`order:`), or draw such rooms again (`require:`)"
             findings.warning("W603", message, placing.span, hint=hint)
 
@@ -543,16 +505,9 @@ def _reads_cell(part: Term) -> bool:
     return isinstance(part, terms.Here) or (isinstance(part, terms.Test) and part.subject is None)
 
 
-@dataclass
-class _Found:
-    """In how many rooms each entity is without a cell."""
-
-    rooms: int
-    absent: Counter[int]
-
-
-def _tried(checked: CheckedScenario) -> _Found:
-    found, generator, left = _Found(0, Counter()), Random(0), _EFFORT
+def _tried(checked: CheckedScenario) -> tuple[int, Counter[int]]:
+    """How many rooms were drawn, and in how many of them each entity is without a cell."""
+    drawn, absent, generator, left = 0, Counter[int](), Random(0), _EFFORT
     sizes = _sizes(checked)
     generator.shuffle(sizes)
     rooms = _ROOMS // len(sizes) * len(sizes) or _ROOMS  # each size equally often
@@ -564,9 +519,9 @@ def _tried(checked: CheckedScenario) -> _Found:
         left -= room.effort
         if left < 0:
             break
-        found.rooms += 1
-        found.absent.update(room.absent)
-    return found
+        drawn += 1
+        absent.update(room.absent)
+    return drawn, absent
 
 
 _CellsOf = Callable[[Region, Size, bool], frozenset[Cell]]
@@ -575,7 +530,7 @@ _CellsOf = Callable[[Region, Size, bool], frozenset[Cell]]
 def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) -> Iterator[Cell]:
     """The cells of a region whose arguments are known."""
     if region.name == "wall":
-        side = region.side or _SIDES[region.args[0].value]  # type: ignore[union-attr]
+        side = region.side or SIDES[region.args[0].value]  # type: ignore[union-attr]
         yield from wall_cells(region, size, side)
         return
     inside = interior_cells(region, size)
@@ -692,21 +647,16 @@ class _DrawnRoom(PartialEvaluation):
 
     def _quantified(self, term: terms.Quantification) -> int | None:
         truths = [(item.value, self._holds_for(term, item.value)) for item in term.items]
-        match term.op:
-            case "any" | "all":
-                return _joined(term.op == "all", (truth for _, truth in truths))
-            case "count":
-                return (
-                    None
-                    if any(truth is None for _, truth in truths)
-                    else sum(map(bool, dict(truths).values()))
-                )
-            case "first" | "pick":
-                fitting = [value for value, truth in truths if truth]
-                if not fitting or any(truth is None for _, truth in truths):
-                    return None
-                return fitting[0] if term.op == "first" else self._generator.choice(fitting)
-        return None
+        if term.op in ("any", "all"):
+            return _joined(term.op == "all", (truth for _, truth in truths))
+        if any(truth is None for _, truth in truths):
+            return None
+        if term.op == "count":
+            return sum(map(bool, dict(truths).values()))
+        fitting = [value for value, truth in truths if truth]
+        if not fitting or term.op == "nearest":
+            return None
+        return fitting[0] if term.op == "first" else self._generator.choice(fitting)
 
     def _holds_for(self, term: terms.Quantification, value: int) -> int | None:
         if term.condition is None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
-from typing import Final, Literal, cast
+from typing import Final, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -16,11 +17,10 @@ from socialai_dsl.semantics.scope import (
     FailedError,
     Macro,
     Scope,
-    at_every_step,
     described,
     quoted,
-    reset_scope,
     spoken,
+    step_scope,
     surviving,
     usage,
 )
@@ -36,6 +36,7 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Here,
     Quantification,
+    Quantifier,
     Read,
     Select,
     SitedTerm,
@@ -53,8 +54,6 @@ MAX_GROUP = 256
 MAX_WEIGHT = 100
 THOSE: Final = "those"
 _MOST_CELLS = 28 * 28
-
-Op = Literal["any", "all", "count", "first", "pick", "nearest"]
 
 
 @dataclass(frozen=True)
@@ -97,27 +96,16 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
         case ast.Attribute(subject=ast.Name(id=slot)) if is_group(resolver, node, scope):
             type_ = resolver.symbols.slots[slot].words
             return Group(type_, constants(type_))
-        case ast.Name(id=word):
-            bound = scope.variables.get(word)
+        case ast.Name(id=word) if word in scope.variables:
+            bound = scope.variables[word]
             if isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope):
                 return group(resolver, bound.node, expected, bound.scope)
-            if bound is None and word == "cells":
-                return _cells(resolver, node, scope)
-            if bound is None and word in ("colors", "nouns"):
-                type_ = COLOR if word == "colors" else resolver.symbols.nouns
-                if type_.size == 0:
-                    raise resolver.fail("S201", "this grammar has slots, and no `nouns`", node, scope)
-                return Group(type_, constants(type_))
-            if bound is None and is_everybody(resolver, word):
-                return _everybody(resolver, word)
-            objects = resolver.symbols.objects.get(word)
-            if bound is None and word in resolver.symbols.groups:
-                numbers = [resolver.symbols.numbers[name] for name in resolver.symbols.groups[word]]
-                type_ = Type("entity", numbers[0], numbers[-1])
-                return Group(type_, constants(type_))
-            if bound is None and objects is not None:
-                type_ = Type("entity", objects.numbers[0], objects.numbers[-1])
-                return Group(type_, constants(type_))
+        case ast.Name(id="cells"):
+            return _cells(resolver, node, scope)
+        case ast.Name(id=word) if (whole := _type_of_all(resolver, word)) is not None:
+            if whole.size == 0:
+                raise resolver.fail("S201", "this grammar has slots, and no `nouns`", node, scope)
+            return Group(whole, constants(whole))
     single = resolver.value(node, expected, scope)
     if isinstance(single, Const):
         return Group(single.type, (single,))
@@ -134,10 +122,22 @@ def is_everybody(resolver: Resolver, word: str) -> bool:
     return word not in symbols.declared and (word == "cast" or (word == "objects" and bool(symbols.objects)))
 
 
-def _everybody(resolver: Resolver, word: str) -> Group:
-    members, entities = len(resolver.symbols.numbers), resolver.symbols.entities
-    type_ = Type("entity", 0, members - 1) if word == "cast" else Type("entity", members, entities - 1)
-    return Group(type_, constants(type_))
+def _type_of_all(resolver: Resolver, word: str) -> Type | None:
+    """The type that has exactly the members of a group, of the cast, of things, or of colours or nouns."""
+    symbols = resolver.symbols
+    if word in ("colors", "nouns"):
+        return COLOR if word == "colors" else symbols.nouns
+    if is_everybody(resolver, word):
+        members = len(symbols.numbers)
+        return (
+            Type("entity", 0, members - 1)
+            if word == "cast"
+            else Type("entity", members, symbols.entities - 1)
+        )
+    numbers: Items[int] = [symbols.numbers[name] for name in symbols.groups.get(word, ())]
+    if word in symbols.objects:
+        numbers = symbols.objects[word].numbers
+    return Type("entity", numbers[0], numbers[-1]) if numbers else None
 
 
 def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
@@ -218,8 +218,10 @@ def _joined(resolver: Resolver, node: ast.Expr, items: list[Const], scope: Scope
     """Alternatives under one type that has room for all of them."""
     kinds = {item.type.kind for item in items}
     if len(kinds) > 1:
-        first, second = (described(item.type) for item in _different(items))
-        raise resolver.fail("S204", f"`{quoted(node)}` mixes {first} with {second}", node, scope)
+        first = items[0].type
+        other = next(item.type for item in items if item.type.kind != first.kind)
+        message = f"`{quoted(node)}` mixes {described(first)} with {described(other)}"
+        raise resolver.fail("S204", message, node, scope)
     if kinds == {"text"}:
         words = tuple(dict.fromkeys(spoken(item.type, item.value) for item in items))
         type_ = Type("text", 0, len(words) - 1, words)
@@ -229,11 +231,6 @@ def _joined(resolver: Resolver, node: ast.Expr, items: list[Const], scope: Scope
         type_ = Type(items[0].type.kind, min(numbers), max(numbers))
         return Group(type_, tuple(Const(type_, value) for value in numbers))
     return Group(items[0].type, tuple(items))
-
-
-def _different(items: list[Const]) -> Iterator[Const]:
-    yield items[0]
-    yield next(item for item in items if item.type.kind != items[0].type.kind)
 
 
 def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, scope: Scope) -> Term:
@@ -250,7 +247,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
     to = resolver.somewhere(node.to, scope) if node.to is not None else None
-    return made(cast(Op, node.name), members, variable, condition, scope, ordinal, to)
+    return made(cast(Quantifier, node.name), members, variable, condition, scope, ordinal, to)
 
 
 def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> None:
@@ -273,11 +270,11 @@ def pick(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     """`pick(group)` and `first(group)`, `count(group)`: without a condition."""
     ordinal = scope.draws.number() if node.name == "pick" else 0
     members = group(resolver, node.args[0], opened(expected) if node.name != "count" else None, scope)
-    return made(cast(Op, node.name), members, named("each", scope), None, scope, ordinal)
+    return made(cast(Quantifier, node.name), members, named("each", scope), None, scope, ordinal)
 
 
 def made(
-    op: Op,
+    op: Quantifier,
     members: Group,
     variable: str,
     condition: Term | None,
@@ -528,7 +525,7 @@ def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
         open_: SitedTerm | None = None
         with surviving():
             if model.while_ is not None:
-                open_ = resolver.sited(model.while_, BOOL, at_every_step(reset_scope(path)))
+                open_ = resolver.sited(model.while_, BOOL, step_scope(path))
             yield MemoryPlan(f"memory.{name}", model.last, utterance_type(resolver), open_)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.schema.scenario import Register, Scenario
@@ -18,12 +18,12 @@ from socialai_dsl.semantics.scope import (
     FailedError,
     Objects,
     Scope,
-    at_every_step,
     frames_of,
     object_scope,
     of_each,
     quoted,
     reset_scope,
+    step_scope,
     surviving,
     with_article,
 )
@@ -106,10 +106,12 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
 def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
     """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
     scenario = resolver.symbols.scenario
+    if resolver.moved_inside is None:
+        resolver.moved_inside = _moved_inside(scenario)
     return scenario.objects[objects.name].inside is not None or objects.name in resolver.moved_inside
 
 
-def moved_inside(scenario: Scenario) -> set[str]:
+def _moved_inside(scenario: Scenario) -> set[str]:
     """All names in what is moved into something, and in what these names stand for."""
     subjects = [
         node.subject
@@ -179,7 +181,7 @@ def contained(resolver: Resolver) -> dict[int, tuple[int, ...]]:
 
 
 @dataclass(frozen=True)
-class _Kind:
+class LinkKind:
     """A kind of link: its key, and the statuses that what it works on must be able to have."""
 
     key: str
@@ -188,29 +190,22 @@ class _Kind:
     lack: str
 
 
-_UNLOCKS = _Kind("unlocks", "unlock", frozenset({"locked"}), "has no lock")
-_OPENS = _Kind("opens", "open", frozenset({"open", "closed"}), "cannot be opened")
+UNLOCKS = LinkKind("unlocks", "unlock", frozenset({"locked"}), "has no lock")
+OPENS = LinkKind("opens", "open", frozenset({"open", "closed"}), "cannot be opened")
 
 
-def unlocked(resolver: Resolver) -> dict[int, tuple[int, ...]]:
-    """Object -> the objects it unlocks; reports what is no lock, or has nothing to do with one."""
-    return _all_links(resolver, _UNLOCKS)
+def links(resolver: Resolver, kind: LinkKind) -> Mapping[int, tuple[int, ...]]:
+    """Object -> the objects it unlocks, or that are open while it is active; reports what cannot be linked, once."""
+    if kind.key not in resolver.links:
+        found: dict[int, tuple[int, ...]] = {}
+        for objects in resolver.symbols.objects.values():
+            with surviving():
+                found |= _links_of(resolver, objects, kind)
+        resolver.links[kind.key] = found
+    return resolver.links[kind.key]
 
 
-def opened(resolver: Resolver) -> dict[int, tuple[int, ...]]:
-    """Object -> the objects that are open while it is active; reports what cannot be."""
-    return _all_links(resolver, _OPENS)
-
-
-def _all_links(resolver: Resolver, kind: _Kind) -> dict[int, tuple[int, ...]]:
-    found: dict[int, tuple[int, ...]] = {}
-    for objects in resolver.symbols.objects.values():
-        with surviving():
-            found |= _links_of(resolver, objects, kind)
-    return found
-
-
-def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tuple[int, ...]]:
+def _links_of(resolver: Resolver, objects: Objects, kind: LinkKind) -> dict[int, tuple[int, ...]]:
     raw = getattr(resolver.symbols.scenario.objects[objects.name], kind.key)
     if raw is None:
         return {}
@@ -254,7 +249,7 @@ def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[int]:
 def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     """`door.unlocked_by`: what unlocks it, whichever of its group it is."""
     found: dict[int, int] = {}
-    for key, locks in resolver.unlocks.items():
+    for key, locks in links(resolver, UNLOCKS).items():
         for lock in locks:
             if lock in found and who.type.low <= lock <= who.type.high:
                 message = f"several things unlock `{resolver.symbols.called(lock)}`"
@@ -283,7 +278,7 @@ def _some_failed(resolver: Resolver) -> bool:
     """Whether it is not known, after a mistake that has been reported, what something unlocks."""
     symbols = resolver.symbols
     linked = [name for name, group in symbols.scenario.objects.items() if group.unlocks is not None]
-    return any(symbols.objects[name].numbers[0] not in resolver.unlocks for name in linked)
+    return any(symbols.objects[name].numbers[0] not in links(resolver, UNLOCKS) for name in linked)
 
 
 # -- statuses: the one an object begins with, and those that follow from a condition -------------------------
@@ -385,7 +380,7 @@ def _add(
     span = resolver.findings.places.key_span(("objects", objects.name, key))
     if one.entity in found:
         raise resolver.findings.fail("S107", "only one status of an object can be computed", span)
-    if key == "locked" and any(one.entity in locks for locks in resolver.unlocks.values()):
+    if key == "locked" and any(one.entity in locks for locks in links(resolver, UNLOCKS).values()):
         message = f"`{objects.name}` is unlocked by something (`unlocks`) and computed (`locked`); only one can decide"
         raise resolver.findings.fail("S107", message, span)
     found[one.entity] = one
@@ -455,7 +450,7 @@ def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:
             continue
         path = resolver.symbols.member_path(name, "accepts")
         with surviving():
-            scope = at_every_step(reset_scope(path, f"cast.{name}.accepts", name))
+            scope = step_scope(path, f"cast.{name}.accepts", name)
             asked = resolver.sited(member.accepts, BOOL, scope)
             if not hands.carryable(resolver):
                 message = "nothing here can be given"
@@ -480,11 +475,10 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
     for member in map(str, members):
         known = resolver.symbols.cast[member].beliefs
         if node.name not in known:
-            near = did_you_mean(node.name, known)
-            hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
+            hint = f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"
-            raise resolver.no_such(node.name, message, node, scope, suggestion=near, hint=hint)
+            raise resolver.no_such(node.name, message, node, scope, **advice_on(node.name, known, hint))
     if any(register_of(str(member), node.name) not in resolver.registers for member in members):
         raise FailedError  # what it starts with is missing, which has been reported
     return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])

@@ -17,7 +17,7 @@ from socialai_dsl.semantics.terms import (
     Type,
 )
 from socialai_dsl.source import Span
-from socialai_dsl.vocabulary import Sentences
+from socialai_dsl.vocabulary import Sentences, Side
 
 FOR_EVER: Final = -1
 """The duration of a step that never ends."""
@@ -47,7 +47,7 @@ class Region:
         "wall",
     ]
     args: tuple[Term, ...] = ()
-    side: Literal["top", "bottom", "left", "right"] | None = None
+    side: Side | None = None
     margin: int = 1
 
 
@@ -432,9 +432,14 @@ class MemoryPlan:
     open: SitedTerm | None
 
 
+PropertyKind = Literal[
+    "reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"
+]  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True)
 class PropertyPlan:
-    """An entry of `check`. `text` is how it was written; `site` its address, `check[0]`.
+    """An entry of `check`. `text` is how it was written.
 
     `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
     read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
@@ -443,9 +448,8 @@ class PropertyPlan:
     what success depends on is to be `knowable`, or not to be.
     """
 
-    kind: Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
+    kind: PropertyKind
     text: str
-    site: str
     span: Span
     condition: SitedTerm | None = None
     goals: tuple[str, ...] = ()

@@ -144,7 +144,10 @@ def _check_states(
         span = findings.at((*path, "start"), 0, len(frame.start))
         findings.error("S301", f"no state `{frame.start}` in frame `{name}`", span, suggestion=near)
         return
-    targets = {state: _targets(body) for state, body in states.items()}
+    targets = {
+        state: [target for rule in body.rules for target in (rule.goto, rule.goto_now) if target is not None]
+        for state, body in states.items()
+    }
     if any(target not in states for found in targets.values() for target in found):
         return  # reported where it is written; which states are entered cannot be known
     entered = _reachable(frame.start or next(iter(states)), targets)
@@ -155,10 +158,6 @@ def _check_states(
                 "W306", f"state `{state}` can never be entered", span, hint="no `goto` leads to it"
             )
     _check_circles(states, path, findings)
-
-
-def _targets(state: State) -> list[str]:
-    return [target for rule in state.rules for target in (rule.goto, rule.goto_now) if target is not None]
 
 
 def _reachable(start: str, targets: dict[str, list[str]]) -> set[str]:
@@ -570,11 +569,7 @@ def _bounds(left: Term, right: Term) -> str:
 
 def _called(term: Term) -> str:
     match term:
-        case terms.World(name=name):
-            return f"`{name}`"
-        case terms.FieldOf(name=name):
-            return f"`{name}`"
-        case terms.Measure(name=name):
+        case terms.World(name=name) | terms.FieldOf(name=name) | terms.Measure(name=name):
             return f"`{name}`"
         case terms.Read(path=path):
             return f"`{path.rpartition('.')[2]}`"
@@ -602,7 +597,7 @@ class _Statuses:
         for one in checked.computed:
             self._computed.setdefault(one.entity, set()).update((one.on, one.off))
         self._effects: dict[int, list[Effect]] = {}
-        for effect in _effects(checked):
+        for effect in (effect for plan in checked.causing for effect in plan.causes):
             for entity in effect.entities:
                 for number in entity.type.values:
                     self._effects.setdefault(number, []).append(effect)
@@ -663,8 +658,3 @@ class _Statuses:
             case "become" if isinstance(effect.value, Const):
                 return {effect.value.value}
         return None
-
-
-def _effects(checked: CheckedScenario) -> Iterator[Effect]:
-    for plan in checked.causing:
-        yield from plan.causes

@@ -10,8 +10,8 @@ from socialai_dsl.schema.scenario import Expression, Probe
 from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.resolver import Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, at_every_step, reset_scope, spoken, surviving
-from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term, walk
+from socialai_dsl.semantics.scope import FailedError, spoken, step_scope, surviving
+from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
@@ -28,13 +28,8 @@ Text = tuple[str | Drawn, ...]
 
 def probes(resolver: Resolver) -> tuple[ProbePlan, ...]:
     """The entries in the order written; those with a mistake are left out once it has been reported."""
-    remembered = resolver.registers.remembered
-    known = len(remembered)
-    try:
+    with resolver.registers.apart():
         return tuple(_plans(resolver))
-    finally:
-        # What only probes ask about the step before is no part of the scenario's program.
-        del remembered[known:]
 
 
 def _plans(resolver: Resolver) -> Iterator[ProbePlan]:
@@ -61,11 +56,7 @@ class _Entry:
     def plan(self) -> ProbePlan:
         """The entry with everything resolved."""
         when, ask, answer, answers = self._parts()
-        terms = [
-            sited.term for sited in (*([when] if when else []), *(value.value for value in self._values))
-        ]
-        used = {part.path for term in terms for part in walk(term) if hasattr(part, "path")}
-        own = tuple(item for item in self._resolver.registers.remembered if item.path in used)
+        own = self._resolver.registers.remembered_in((when, self._values))
         span = self._findings.places.key_span(self._path)
         return ProbePlan(self._name, span, when, ask, answer, answers, own)
 
@@ -88,13 +79,13 @@ class _Entry:
         return when, ask, answer, answers
 
     def _condition(self, raw: Expression) -> SitedTerm:
-        return self._undrawn(self._resolver.sited(raw, BOOL, self._scope((*self._path, "when"))))
+        return self._undrawn(self._resolver.sited(raw, BOOL, step_scope((*self._path, "when"))))
 
     def _answer(self) -> Drawn:
         """What is right."""
         path = (*self._path, "answer")
         node = self._findings.expression(path, self._entry.answer)
-        scope = self._scope(path)
+        scope = step_scope(path)
         term = sayable(self._resolver, node, scope, or_condition=True)
         return self._value(
             "answer", self._undrawn(SitedTerm(term, scope.draws.site, self._findings.at(path)))
@@ -103,7 +94,7 @@ class _Entry:
     def _text(self, part: str, path: DataPath, raw: str) -> Text:
         """The pieces of a text and the values in it."""
         text = self._findings.text(path, raw)
-        scope = self._scope(path)
+        scope = step_scope(path)
         pieces: list[str | Drawn] = []
         for piece in parts(self._resolver, text, scope):
             if isinstance(piece, Term):
@@ -178,9 +169,6 @@ class _Entry:
             raise self._findings.fail("S106", message, sited.span, hint="bound it: min(..., 100)")
         self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
         return self._values[-1]
-
-    def _scope(self, path: DataPath) -> Scope:
-        return at_every_step(reset_scope(path))
 
     def _undrawn(self, sited: SitedTerm) -> SitedTerm:
         """The same, in which nothing is drawn: who asks changes nothing."""

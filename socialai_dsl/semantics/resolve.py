@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -21,7 +20,6 @@ from socialai_dsl.semantics.scope import (
     described,
     quoted,
     spoken,
-    surviving,
     usage,
     wrong_count,
 )
@@ -50,6 +48,7 @@ from socialai_dsl.semantics.terms import (
     Not,
     Operation,
     ReadEach,
+    RelationName,
     Sees,
     Select,
     SitedTerm,
@@ -77,10 +76,6 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.vocabulary import FINISHED
 
-_RELATIONS = (
-    *("at", "next_to", "in_front_of", "faces", "faces_toward", "eye_contact", "in_line", "can_reach"),
-    *("looks_at", "unobstructed"),
-)
 _OF_BODIES = ("in_front_of", "eye_contact")
 """Relations to something that can be turned to somewhere, which a cell is not."""
 
@@ -122,11 +117,11 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     if node.name == "looks_at":
         assert subject is not None, "internal: a cell looks at nothing"
         _check_viewer(resolver, subject, node, scope)
-    if node.name in _RELATIONS:
+    if node.name in get_args(RelationName):
         return _relation(resolver, node.name, subject, argument, scope)
     if node.name in ("joint_attention", "points_at", "toggled_by"):
         assert subject is not None, "internal: a cell attends to nothing"
-        return _attention(resolver, node.name, subject, node, scope)
+        return _attention(resolver, subject, node, scope)
     if node.name == "carries":
         assert subject is not None, "internal: a cell carries nothing"
         return hands.carries(resolver, subject, node, scope)
@@ -233,24 +228,22 @@ def _listener(resolver: Resolver, node: ast.Call, scope: Scope) -> None:
 
 
 def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast.Expr, scope: Scope) -> Term:
-    if groups.is_group(resolver, argument, scope):
-        return groups.any_member(
-            resolver, argument, scope, lambda other: Test(cast(Any, name), subject, other)
-        )
-    other = (
-        resolver.value(argument, ENTITY, scope) if name in _OF_BODIES else resolver.somewhere(argument, scope)
-    )
-    return Test(cast(Any, name), subject, other)
+    def related(other: Term) -> Term:
+        return Test(cast(RelationName, name), subject, other)
+
+    if name in _OF_BODIES and not groups.is_group(resolver, argument, scope):
+        return related(resolver.value(argument, ENTITY, scope))
+    return _each(resolver, argument, scope, related)
 
 
-def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, scope: Scope) -> Term:
+def _attention(resolver: Resolver, subject: Term, node: ast.Call, scope: Scope) -> Term:
     """What two members look at, what one points at, the one that toggled at something."""
     first, *rest = node.args
-    if name == "toggled_by":
-        check_toggled(resolver, name, subject, node, scope)
+    if node.name == "toggled_by":
+        check_toggled(resolver, node.name, subject, node, scope)
         return _toggled_by(resolver, subject, first, scope)
-    if name == "points_at":
-        check_points(resolver, name, subject, node, scope)
+    if node.name == "points_at":
+        check_points(resolver, node.name, subject, node, scope)
         return _each(resolver, first, scope, lambda other: _points_at(subject, other))
     other = resolver.value(first, ENTITY, scope)
     if max(subject.type.high, other.type.high) >= len(resolver.symbols.numbers):
@@ -275,9 +268,7 @@ def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) ->
         raise resolver.fail("S211", "`toggled_by` takes a member of the cast", node, scope)
     if isinstance(who, Const):
         return toggled_by(who, what)
-    cases = []
-    for one in constants(who.type):
-        cases.append(all_of([Compare("==", who, one), toggled_by(one, what)]))
+    cases = (all_of([Compare("==", who, one), toggled_by(one, what)]) for one in constants(who.type))
     return where_there_is(who, any_of(cases))
 
 
@@ -380,33 +371,7 @@ def _member(resolver: Resolver, who: Const | None, node: ast.Expr, scope: Scope)
 
 
 class ScenarioResolver(Resolver):
-    """The resolver of a scenario: every kind of expression, and what is known of the whole."""
-
-    def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-        """Keys and values of a table; raises FailedError once what is wrong with it has been reported."""
-        if name not in self._tables:
-            self._tables[name] = None
-            with surviving():
-                self._tables[name] = tables.resolved(self, name)
-        found = self._tables[name]
-        if found is None:
-            raise FailedError
-        return found
-
-    @cached_property
-    def unlocks(self) -> Mapping[int, tuple[int, ...]]:
-        """Object -> the objects it unlocks."""
-        return object_facts.unlocked(self)
-
-    @cached_property
-    def moved_inside(self) -> set[str]:
-        """Names of what some effect moves into something."""
-        return object_facts.moved_inside(self.symbols.scenario)
-
-    @cached_property
-    def opens(self) -> Mapping[int, tuple[int, ...]]:
-        """Object -> the objects that are open while it is active."""
-        return object_facts.opened(self)
+    """The resolver of a scenario: the meaning of every kind of expression."""
 
     def meaning(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         """The term for a tree by what kind of node it is."""
@@ -544,7 +509,7 @@ class ScenarioResolver(Resolver):
         raise self.fail("S204", message, node, scope, hint=hint)
 
     def _membership(self, node: ast.Member, scope: Scope) -> Term:
-        options = self._options(node.right)
+        options = ast.options_of(node.right)
         lead = next((o for o in options if not self.is_bare(o, scope)), None)
         if self.is_bare(node.left, scope) and lead is not None:
             left = self.value(node.left, self._element(lead, scope), scope)
@@ -563,9 +528,6 @@ class ScenarioResolver(Resolver):
         if groups.is_group(self, option, scope):
             return groups.group(self, option, None, asked).type
         return self.value(option, None, asked).type
-
-    def _options(self, node: ast.Expr) -> tuple[ast.Expr, ...]:
-        return node.options if isinstance(node, ast.Alternatives) else (node,)
 
     def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope) -> tuple[Term, Term | None]:
         """Whether a value is one option, or in it, and the option itself if that is one value."""

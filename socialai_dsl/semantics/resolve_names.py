@@ -87,12 +87,10 @@ def without_arguments(
     signature = VALUES.get(name)
     if name in resolver.symbols.slots:
         signature = replace(VALUES["noun"], name=name)
-    statuses = {state for type_ in resolver.symbols.types.values() for state in type_.states}
     if signature is None or signature.takes:
-        if name in statuses:
-            signature = Signature(name, "object", (), "condition", "value", "")
-        else:
-            raise _unknown_attribute(resolver, name, signature, statuses, node, scope)
+        if name not in _statuses(resolver):
+            raise _unknown_attribute(resolver, name, signature, node, scope)
+        signature = Signature(name, "object", (), "condition", "")
     check_moment(resolver, signature, node, scope)
     if signature.subject == "agent":
         assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
@@ -111,12 +109,7 @@ def without_arguments(
 
 
 def _unknown_attribute(
-    resolver: Resolver,
-    name: str,
-    signature: Signature | None,
-    statuses: set[str],
-    node: ast.Expr,
-    scope: Scope,
+    resolver: Resolver, name: str, signature: Signature | None, node: ast.Expr, scope: Scope
 ) -> FailedError:
     if signature is not None:
         return resolver.fail(
@@ -131,7 +124,7 @@ def _unknown_attribute(
         )
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
     declared = [*resolver.symbols.scenario.looks, *_of_frame(resolver, node)]
-    near = did_you_mean(name, [*known, *sorted(statuses), *declared])
+    near = did_you_mean(name, [*known, *sorted(_statuses(resolver)), *declared])
     near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
     return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
 
@@ -146,10 +139,9 @@ def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
 def _of_the_agent(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
     if name in resolver.symbols.slots:
         return _in_slot(resolver, name, heard=False)
-    match name:
-        case "noun":
-            texts.no_nouns(resolver, node, scope)
-            return World(resolver.symbols.nouns, "noun")
+    if name == "noun":
+        texts.no_nouns(resolver, node, scope)
+        return World(resolver.symbols.nouns, "noun")
     assert name == "action", f"internal: the agent has no `{name}`"
     return World(ACTION, "action")
 
@@ -329,7 +321,7 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
     if frame is None:
         return None
     if word in frame.texts:
-        return _substituted(resolver, node, expected, scope)
+        return _substituted(resolver, node, scope)
     if frame.model.slots.get(word) == "sequence":
         raise _not_a_value(resolver, "sequence", node, scope)
     if word in frame.defines:
@@ -351,7 +343,7 @@ def single(resolver: Resolver, path: str, expected: Type | None, node: ast.Expr,
     return registers.read(path, expected, resolver.findings.node(scope.path, node))
 
 
-def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
+def _substituted(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """A slot that is put in wherever it is used: bool ones as conditions, texts only where something is said."""
     frame = scope.frame
     assert frame is not None, "internal: a slot outside a frame"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import islice, product
+from math import prod
 from typing import Final
 
 from socialai_dsl.grammar import ast
@@ -51,6 +52,7 @@ from socialai_dsl.semantics.terms import (
     integer,
     nothing_of,
     number,
+    walk,
     where_there_is,
 )
 from socialai_dsl.source import DataPath, Span
@@ -149,10 +151,7 @@ def texts_of(line: Line) -> list[str]:
 
 def number_of_texts(line: Line) -> int:
     """How many texts a line can be."""
-    count = 1
-    for part in line.parts:
-        count *= 1 if isinstance(part, str) else part.type.size
-    return count
+    return prod(1 if isinstance(part, str) else part.type.size for part in line.parts)
 
 
 def words_of_values(type_: Type) -> list[str]:
@@ -249,6 +248,20 @@ class Registers:
             known = Drawn(f"{NOTED}{len(self.remembered)}", value.term.type, value)
             self.remembered.append(known)
         return Read(known.type, known.path)
+
+    @contextmanager
+    def apart(self) -> Iterator[None]:
+        """What is asked in it about the step before is no part of the scenario's program."""
+        known = len(self.remembered)
+        try:
+            yield
+        finally:
+            del self.remembered[known:]
+
+    def remembered_in(self, parts: object) -> tuple[Drawn, ...]:
+        """The registers for `prev` that are read in terms, or parts of plans."""
+        used = {part.path for part in walk(parts) if hasattr(part, "path")}
+        return tuple(drawn for drawn in self.remembered if drawn.path in used)
 
     def __contains__(self, path: str) -> bool:
         return path in self._declared or path in self._terms
@@ -491,6 +504,9 @@ ENTITY = Type("entity", 0, 0)
 VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
 """The types whose words belong to the language."""
 
+SAYABLE = ("text", "noun", "color", "int", "status", "look", "direction", "action")
+"""Kinds of values that can stand in a text."""
+
 WORDED = ("text", "noun", "color", "status", "look")
 """Kinds of values that are called by words, which values of another kind may be called as well."""
 
@@ -509,6 +525,7 @@ class Resolver(ABC):
         missing_keys: table and word of what may be looked up and is not there, once it has been reported.
         slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
         addresses: whether the agent or an NPC addresses a single hearer.
+        tables, links, moved_inside: what `tables` and `object_facts` have found out already.
     """
 
     def __init__(
@@ -532,26 +549,9 @@ class Resolver(ABC):
         self.addresses = symbols.scenario.grammar.to is not None or any(to is not None for to in said_to)
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
-        self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
-
-    @abstractmethod
-    def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-        """Keys and values of a table; raises FailedError once what is wrong with it has been reported."""
-
-    @property
-    @abstractmethod
-    def unlocks(self) -> Mapping[int, tuple[int, ...]]:
-        """Object -> the objects it unlocks."""
-
-    @property
-    @abstractmethod
-    def opens(self) -> Mapping[int, tuple[int, ...]]:
-        """Object -> the objects that are open while it is active."""
-
-    @property
-    @abstractmethod
-    def moved_inside(self) -> set[str]:
-        """Names of what some effect moves into something."""
+        self.tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
+        self.links: dict[str, dict[int, tuple[int, ...]]] = {}
+        self.moved_inside: set[str] | None = None
 
     @abstractmethod
     def meaning(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Look
 from socialai_dsl.semantics import groups
@@ -168,31 +168,13 @@ def _starts(resolver: Resolver, name: str, look: Look, count: int) -> tuple[tupl
 
 def look(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
     """The look of what stands before the dot; in a frame without one that of the member itself."""
-    (found,) = _looks(resolver, name, _bearers(resolver, name, node, scope, several=False), node, scope)
+    (found,) = looks(resolver, name, node, scope, several=False)
     return found
 
 
-def looks_set(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> list[Term]:
-    """The looks that `set` changes: that of one, or those of each of a group."""
-    return _looks(resolver, name, _bearers(resolver, name, node, scope, several=True), node, scope)
-
-
-def _bearers(resolver: Resolver, name: str, node: ast.Expr, scope: Scope, several: bool) -> tuple[Term, ...]:
-    """Whose look is meant."""
-    if isinstance(node, ast.Attribute):
-        if several and groups.is_group(resolver, node.subject, scope):
-            return tuple(dict.fromkeys(groups.group(resolver, node.subject, None, scope).items))
-        return (resolver.value(node.subject, ENTITY, scope),)
-    if scope.member is None:
-        message = f"`{name}` is a look: say whose, `x.{name}`"
-        raise resolver.fail("S211", message, node, scope)
-    return (entity(resolver.symbols.numbers[scope.member]),)
-
-
-def _looks(
-    resolver: Resolver, name: str, bearers: tuple[Term, ...], node: ast.Expr, scope: Scope
-) -> list[Term]:
-    """The registers of a look; what cannot have it is a mistake."""
+def looks(resolver: Resolver, name: str, node: ast.Expr, scope: Scope, several: bool = True) -> list[Term]:
+    """The looks that are meant, perhaps those of each of a group; what cannot have it is a mistake."""
+    bearers = _bearers(resolver, name, node, scope, several)
     registers, path = resolver.registers, f"looks.{name}"
     if path not in registers:
         raise FailedError  # its group means nothing, which has been reported
@@ -207,6 +189,18 @@ def _looks(
             raise resolver.fail("S204", message, node, scope, hint=f"what has one: {listed}")
         found.append(registers.of_key(path, who))
     return found
+
+
+def _bearers(resolver: Resolver, name: str, node: ast.Expr, scope: Scope, several: bool) -> tuple[Term, ...]:
+    """Whose look is meant."""
+    if isinstance(node, ast.Attribute):
+        if several and groups.is_group(resolver, node.subject, scope):
+            return tuple(dict.fromkeys(groups.group(resolver, node.subject, None, scope).items))
+        return (resolver.value(node.subject, ENTITY, scope),)
+    if scope.member is None:
+        message = f"`{name}` is a look: say whose, `x.{name}`"
+        raise resolver.fail("S211", message, node, scope)
+    return (entity(resolver.symbols.numbers[scope.member]),)
 
 
 def look_plans(resolver: Resolver) -> Iterator[LookPlan]:
@@ -236,8 +230,7 @@ def check_tone(resolver: Resolver, name: str) -> None:
     looks, findings = resolver.symbols.scenario.looks, resolver.findings
     span = findings.at(("observe", "tone"), 0, len(name))
     if name not in looks:
-        near = did_you_mean(name, looks)
-        hint = None if near else "looks are declared under `looks:`"
-        findings.error("S201", f"unknown look `{name}`", span, suggestion=near, hint=hint)
+        advice = advice_on(name, looks, "looks are declared under `looks:`")
+        findings.error("S201", f"unknown look `{name}`", span, **advice)
     elif not any(tone_of(resolver, number) for number in range(1, len(resolver.symbols.numbers))):
         findings.error("S204", f"no NPC has a `{name}`, so nobody speaks in that tone", span)

@@ -572,9 +572,9 @@ def object_scope(objects: Objects, index: int, path: DataPath, key: str, *, at_r
     return Scope(path, draws, at_reset=at_reset, it=entity(objects.numbers[index]))
 
 
-def at_every_step(scope: Scope) -> Scope:
-    """The same names for a value that is computed anew in every step."""
-    return replace(scope, at_reset=False)
+def step_scope(path: DataPath, site: str | None = None, member: str | None = None) -> Scope:
+    """The scope of a value that is computed anew in every step."""
+    return Scope(path, Draws(site or dotted(path)), member=member)
 
 
 def parse_define(key: str) -> tuple[str, tuple[str, ...]] | None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
-from typing import Literal
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
 from socialai_dsl.semantics import groups, hands, object_facts, tables
@@ -49,8 +48,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.source import DataPath, Span
-
-_SIDES: tuple[Literal["top", "bottom", "left", "right"], ...] = ("top", "bottom", "left", "right")
+from socialai_dsl.vocabulary import SIDES
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def place(resolver: Resolver, spot: Spot, raw: str, scope: Scope) -> Placing:
         region, condition = node, None
     if isinstance(region, ast.Name) and region.id == "nowhere":
         return Placing(spot.entity, spot.site, spot.number, span, nowhere=True)
-    regions = _regions(resolver, region, spot, scope)
+    regions = tuple(_regions(resolver, region, scope, spot))
     if condition is not None:
         where = resolver.value(condition, BOOL, replace(scope, here=True))
     return Placing(
@@ -99,12 +97,13 @@ def place(resolver: Resolver, spot: Spot, raw: str, scope: Scope) -> Placing:
     )  # fmt: skip
 
 
-def _regions(resolver: Resolver, node: ast.Expr, spot: Spot, scope: Scope) -> tuple[Region, ...]:
-    options = node.options if isinstance(node, ast.Alternatives) else (node,)
-    return tuple(r for option in options for r in region(resolver, option, scope, spot))
+def _regions(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None = None) -> Iterator[Region]:
+    """The regions of a place, which may be alternatives."""
+    for option in ast.options_of(node):
+        yield from _region(resolver, option, scope, spot)
 
 
-def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None = None) -> tuple[Region, ...]:
+def _region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None) -> tuple[Region, ...]:
     """The regions that one place word stands for."""
     name, args = _head(resolver, node, scope)
     define = resolver.symbols.defines.get(name)
@@ -114,8 +113,7 @@ def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None =
         resolver.used.add(define.path)
         body = resolver.findings.expression(define.path, define.raw)
         inner = replace(scope, path=define.path, within=(*scope.within, name))
-        options = body.options if isinstance(body, ast.Alternatives) else (body,)
-        return tuple(r for option in options for r in region(resolver, option, inner, spot))
+        return tuple(_regions(resolver, body, inner, spot))
     match name:
         case "anywhere" | "left_half" | "right_half" | "top_half" | "bottom_half":
             _takes(resolver, node, args, 0, scope)
@@ -133,7 +131,7 @@ def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None =
             _takes(resolver, node, args, 1, scope)
             side = resolver.value(args[0], SIDE, scope)
             if isinstance(side, Const):
-                return (Region("wall", side=_SIDES[side.value]),)
+                return (Region("wall", side=SIDES[side.value]),)
             return (Region("wall", (side,)),)
         case "each_wall":
             return (_each_wall(resolver, node, args, scope, spot),)
@@ -174,18 +172,18 @@ def _each_wall(
         raise resolver.fail(
             "S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope
         )
-    if spot is None or spot.count > len(_SIDES) or spot.count < 2:
+    if spot is None or spot.count > len(SIDES) or spot.count < 2:
         message = "`each_wall` is for a group of two to four, one in each wall"
         raise resolver.fail(
             "S204", message, node, scope, hint="give `count: 4`; for one thing write `wall(top)`"
         )
-    return Region("wall", side=_SIDES[spot.index], margin=margin.value)
+    return Region("wall", side=SIDES[spot.index], margin=margin.value)
 
 
 def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
-    near = did_you_mean(name, [*PLACES, "next_to", "in_front_of"])
-    hint = None if near else "places are " + ", ".join([*PLACES, "next_to", "in_front_of"])
-    return resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
+    places = [*PLACES, "next_to", "in_front_of"]
+    advice = advice_on(name, places, "places are " + ", ".join(places))
+    return resolver.fail("S205", f"unknown place `{name}`", node, scope, **advice)
 
 
 # -- the room: its sizes, its canvas, and what is built into it ----------------------------------------------
@@ -280,15 +278,13 @@ def _built_regions(
 ) -> Iterator[tuple[ObjectType, Region, Span]]:
     findings, scope = resolver.findings, reset_scope(path)
     node = findings.expression(path, raw)
-    for option in node.options if isinstance(node, ast.Alternatives) else (node,):
-        for part in region(resolver, option, scope):
-            reads = [t for t in walk(part.args) if not isinstance(t, World) and hasattr(t, "path")]
-            if reads or part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args):
-                message = "what is built into the room depends on its size alone"
-                raise findings.fail(
-                    "S204", message, findings.at(path), hint="use W and H, and put what is drawn in `objects`"
-                )
-            yield type_, part, findings.at(path)
+    for part in _regions(resolver, node, scope):
+        reads = [t for t in walk(part.args) if not isinstance(t, World) and hasattr(t, "path")]
+        if reads or part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args):
+            message = "what is built into the room depends on its size alone"
+            hint = "use W and H, and put what is drawn in `objects`"
+            raise findings.fail("S204", message, findings.at(path), hint=hint)
+        yield type_, part, findings.at(path)
 
 
 # -- the order: what something needs comes before it ---------------------------------------------------------

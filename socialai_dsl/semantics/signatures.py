@@ -40,8 +40,8 @@ class Signature:
         subject: what stands before the dot; in a frame it may be left out and is then the NPC itself.
         takes: its arguments; `entities` is one or a group, of which any one suffices.
         gives: what it is, in words.
-        use: where it may stand.
         doc: one line for the reference.
+        use: where it may stand.
         momentary: it speaks of the current step, so it means nothing before the first.
         cell: `here` may be its subject as well.
         optional: how many of the last arguments may be left out.
@@ -53,8 +53,8 @@ class Signature:
     subject: Subject
     takes: tuple[Argument, ...]
     gives: str
-    use: Use
     doc: str
+    use: Use = "value"
     momentary: bool = False
     cell: bool = False
     optional: int = 0
@@ -62,18 +62,7 @@ class Signature:
     endless: bool = False
 
 
-def _value(
-    name: str,
-    subject: Subject,
-    takes: tuple[Argument, ...],
-    gives: str,
-    doc: str,
-    *,
-    momentary: bool = False,
-    cell: bool = False,
-    optional: int = 0,
-) -> Signature:
-    return Signature(name, subject, takes, gives, "value", doc, momentary, cell, optional)
+_value = Signature
 
 
 def _activity(
@@ -84,7 +73,7 @@ def _activity(
     moves: Literal["walks", "turns", "stays"] = "walks",
     endless: bool = False,
 ) -> Signature:
-    return Signature(name, "none", takes, "activity", "activity", doc, moves=moves, endless=endless)
+    return Signature(name, "none", takes, "activity", doc, "activity", moves=moves, endless=endless)
 
 
 SIGNATURES: Final[tuple[Signature, ...]] = (
@@ -150,17 +139,17 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y"),
     _value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do"),
     # places
-    Signature("anywhere", "none", (), "place", "place", "all free cells of the room"),
-    Signature("nowhere", "none", (), "place", "place", "not in the room"),
-    Signature("left_half", "none", (), "place", "place", "x < W // 2"),
-    Signature("right_half", "none", (), "place", "place", "x > W // 2"),
-    Signature("top_half", "none", (), "place", "place", "y < H // 2"),
-    Signature("bottom_half", "none", (), "place", "place", "y > H // 2"),
-    Signature("column", "none", ("int",), "place", "place", "the column x, without the walls"),
-    Signature("row", "none", ("int",), "place", "place", "the row y, without the walls"),
-    Signature("rect", "none", ("int", "int", "int", "int"), "place", "place", "from (x0, y0) to (x1, y1)"),
-    Signature("wall", "none", ("side",), "place", "place", "in this wall, not in its corners"),
-    Signature("each_wall", "none", ("int",), "place", "place", "one in each wall, n off the corners", optional=1),
+    Signature("anywhere", "none", (), "place", "all free cells of the room", "place"),
+    Signature("nowhere", "none", (), "place", "not in the room", "place"),
+    Signature("left_half", "none", (), "place", "x < W // 2", "place"),
+    Signature("right_half", "none", (), "place", "x > W // 2", "place"),
+    Signature("top_half", "none", (), "place", "y < H // 2", "place"),
+    Signature("bottom_half", "none", (), "place", "y > H // 2", "place"),
+    Signature("column", "none", ("int",), "place", "the column x, without the walls", "place"),
+    Signature("row", "none", ("int",), "place", "the row y, without the walls", "place"),
+    Signature("rect", "none", ("int", "int", "int", "int"), "place", "from (x0, y0) to (x1, y1)", "place"),
+    Signature("wall", "none", ("side",), "place", "in this wall, not in its corners", "place"),
+    Signature("each_wall", "none", ("int",), "place", "one in each wall, n off the corners", "place", optional=1),
     # activities
     _activity("stay", (), "do nothing", moves="stays", endless=True),
     _activity("left", (), "a quarter turn left", moves="turns"),
@@ -191,16 +180,16 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _activity("choose", ("actions",), "one at random: choose(a | b | 2 * c)", endless=True),
     _activity("wander", (), "choose(forward | left | right)", endless=True),
     # effects
-    Signature("open", "object", (), "effect", "effect", "becomes open"),
-    Signature("close", "object", (), "effect", "effect", "becomes closed"),
-    Signature("lock", "object", (), "effect", "effect", "becomes locked"),
-    Signature("unlock", "object", (), "effect", "effect", "closed, if it was locked"),
-    Signature("reset", "entity", (), "effect", "effect", "status, place and content as when the episode began"),
-    Signature("vanish", "entity", (), "effect", "effect", "leaves the room; it is `gone`"),
-    Signature("reveal", "object", (), "effect", "effect", "becomes opened"),
-    Signature("put", "entity", ("entity",), "effect", "effect", "put(x): comes to the cell of x"),
-    Signature("move_into", "object", ("entity",), "effect", "effect", "move_into(x): lies in x, or is carried by x"),
-    Signature("become", "object", ("status",), "effect", "effect", "takes this status"),
+    Signature("open", "object", (), "effect", "becomes open", "effect"),
+    Signature("close", "object", (), "effect", "becomes closed", "effect"),
+    Signature("lock", "object", (), "effect", "becomes locked", "effect"),
+    Signature("unlock", "object", (), "effect", "closed, if it was locked", "effect"),
+    Signature("reset", "entity", (), "effect", "status, place and content as when the episode began", "effect"),
+    Signature("vanish", "entity", (), "effect", "leaves the room; it is `gone`", "effect"),
+    Signature("reveal", "object", (), "effect", "becomes opened", "effect"),
+    Signature("put", "entity", ("entity",), "effect", "put(x): comes to the cell of x", "effect"),
+    Signature("move_into", "object", ("entity",), "effect", "move_into(x): lies in x, or is carried by x", "effect"),
+    Signature("become", "object", ("status",), "effect", "takes this status", "effect"),
 )  # fmt: skip
 
 VALUES: Final = {s.name: s for s in SIGNATURES if s.use == "value"}

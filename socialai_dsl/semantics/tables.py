@@ -32,14 +32,14 @@ def look_at_all(resolver: Resolver) -> None:
     """Report what is wrong with a table, though nothing may be looked up in it."""
     for name in resolver.symbols.scenario.tables:
         with surviving():
-            resolver.table(name)
+            table(resolver, name)
 
 
 def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     """`dar(exit.color)`: the value beside the key that the argument is."""
     name = node.name
     resolver.used.add(("tables", name))
-    keys, values = resolver.table(name)
+    keys, values = table(resolver, name)
     if len(node.args) != 1:
         raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
     key = _key(resolver, name, node.args[0], scope)
@@ -92,8 +92,19 @@ def _no_key(
     return resolver.fail("S402", message, node, scope, hint=hint)
 
 
-def resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-    """Keys and values of a table."""
+def table(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """Keys and values of a table; raises FailedError once what is wrong with it has been reported."""
+    if name not in resolver.tables:
+        resolver.tables[name] = None
+        with surviving():
+            resolver.tables[name] = _resolved(resolver, name)
+    found = resolver.tables[name]
+    if found is None:
+        raise FailedError
+    return found
+
+
+def _resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
     written = resolver.symbols.scenario.tables[name]
     path: DataPath = ("tables", name)
     if isinstance(written, str):
@@ -147,7 +158,7 @@ def _permuted(
         span = resolver.findings.node(path, node.args[0])
         raise resolver.findings.no_such(other, message, span, suggestion=near)
     resolver.used.add(("tables", other))
-    keys, values = resolver.table(other)
+    keys, values = table(resolver, other)
     order = permutation(resolver, f"tables.{name}", len(keys), path)
     return keys, tuple(chosen(place, range(len(values)), values, values[0].type) for place in order)
 

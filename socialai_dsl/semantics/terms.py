@@ -209,25 +209,19 @@ class Not:
     type: Type = BOOL
 
 
+RelationName = Literal[
+    "at", "next_to", "faces", "faces_toward", "in_front_of", "eye_contact", "in_line", "can_reach", "looks_at",
+    "unobstructed",
+]  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True)
 class Test:
-    """A relation of two entities: at (same cell), next_to, faces, faces_toward, in_front_of, eye_contact, in_line,
-    can_reach, looks_at, unobstructed; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x),
-    here.in_front_of(x)).
+    """A relation of two entities (`at`: on the same cell), or of the candidate cell (`subject` is None:
+    here.next_to(x), here.at(x), here.in_front_of(x)).
     """
 
-    name: Literal[
-        "at",
-        "next_to",
-        "faces",
-        "faces_toward",
-        "in_front_of",
-        "eye_contact",
-        "in_line",
-        "can_reach",
-        "looks_at",
-        "unobstructed",
-    ]
+    name: RelationName
     subject: Term | None
     object: Term
     type: Type = BOOL
@@ -362,6 +356,9 @@ class InState:
     type: Type = BOOL
 
 
+Quantifier = Literal["any", "all", "count", "first", "pick", "nearest"]
+
+
 @dataclass(frozen=True, slots=True)
 class Quantification:
     """any, all, count, first, nearest, pick over the constants `items`; `condition` may hold Variable(name).
@@ -373,7 +370,7 @@ class Quantification:
     """
 
     type: Type
-    op: Literal["any", "all", "count", "first", "pick", "nearest"]
+    op: Quantifier
     variable: str
     items: tuple[Const, ...]
     condition: Term | None

@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, islice, product
+from itertools import chain, groupby, islice, pairwise, product
 from typing import TypeGuard
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
-from socialai_dsl.semantics.plans import RulePlan
-from socialai_dsl.semantics.resolver import INT, MAX_TEXTS, Resolver, texts_of, words_of_values
+from socialai_dsl.semantics.resolver import INT, MAX_TEXTS, SAYABLE, Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
@@ -48,7 +47,6 @@ from socialai_dsl.semantics.terms import (
     World,
     all_of,
     any_of,
-    changed,
     entity,
     equals,
     numbers_of,
@@ -62,8 +60,6 @@ _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 
 ANYTHING = "any"
 """`hears: any` is whatever anybody says."""
-
-_SAYABLE = ("text", "noun", "color", "int", "status", "look", "direction", "action")
 
 
 def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
@@ -86,9 +82,8 @@ def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
 
 def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None, Span]]:
     """The texts that an argument names, each with the condition on what `one_of` drew and where it is written."""
-    options = node.options if isinstance(node, ast.Alternatives) else (node,)
     found: list[tuple[ast.Text, Term | None, Span]] = []
-    for option in options:
+    for option in ast.options_of(node):
         slot = _slot(resolver, option, scope)
         if slot is not None:
             found += [(one.text, one.drawn, resolver.findings.at(one.path)) for one in slot]
@@ -300,20 +295,16 @@ def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
 
 def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
     """The pieces and values of a text."""
-    return list(_each_part(resolver, text, scope))
-
-
-def _each_part(resolver: Resolver, text: ast.Text, scope: Scope) -> Iterator[str | Term]:
+    found: list[str | Term] = []
     for part in text.parts:
         if isinstance(part, str):
-            yield part
-            continue
-        slot = _slot(resolver, part, scope)
-        if slot is not None:
-            yield from _filled(resolver, slot, scope)
-            continue
-        term = sayable(resolver, part, scope)
-        yield spoken(term.type, term.value) if isinstance(term, Const) else term
+            found.append(part)
+        elif (slot := _slot(resolver, part, scope)) is not None:
+            found += _filled(resolver, slot, scope)
+        else:
+            term = sayable(resolver, part, scope)
+            found.append(spoken(term.type, term.value) if isinstance(term, Const) else term)
+    return found
 
 
 def _filled(resolver: Resolver, slot: list[_Filling], scope: Scope) -> list[str | Term]:
@@ -402,7 +393,7 @@ def sayable(resolver: Resolver, node: ast.Expr, scope: Scope, or_condition: bool
         message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
         raise resolver.fail("S402", message, node, scope)
     term = word_in_slot(resolver, node, scope) or resolver.value(node, None, scope)
-    if term.type.kind not in _SAYABLE and not (or_condition and term.type.kind == "bool"):
+    if term.type.kind not in SAYABLE and not (or_condition and term.type.kind == "bool"):
         what = described(term.type)
         hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
         raise resolver.fail(
@@ -413,17 +404,11 @@ def sayable(resolver: Resolver, node: ast.Expr, scope: Scope, or_condition: bool
 
 def _merged(parts: Iterable[str | Term]) -> Iterator[str | Term]:
     """The same with neighbouring pieces of text joined."""
-    text = ""
-    for part in parts:
-        if isinstance(part, str):
-            text += part
-            continue
-        if text:
+    for is_text, run in groupby(parts, lambda part: isinstance(part, str)):
+        if not is_text:
+            yield from run
+        elif text := "".join(map(str, run)):
             yield text
-        text = ""
-        yield part
-    if text:
-        yield text
 
 
 # -- hearing: what a rule hears, what stood in its slots, and what members of the cast have said ----------------
@@ -465,7 +450,7 @@ def on_hearing(heard: Sequence[Alternative], when: SitedTerm | None, site: str, 
 
 
 def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
-    """`speaker` in a rule; which patterns it is about is filled in once they are known (`bound`)."""
+    """`speaker` in a rule; which patterns it is about is filled in once they are known (`binding`)."""
     if not scope.hearing:
         message = "`speaker` is who said what a rule `hears`; nothing is heard here"
         in_rule = scope.frame is not None and any(part in ("first", "then") for part in scope.path)
@@ -651,11 +636,6 @@ def _has(filling: int, asked: set[Digit | None]) -> bool:
     return all(d is None or filling // d.stride % d.radix < d.radix - 1 for d in asked)
 
 
-def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
-    """A rule whose `speaker` and `noun` know what it hears."""
-    return changed(plan, binding(heard))  # type: ignore[no-any-return]
-
-
 def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
     """The meaning of `speaker`, `noun` and slots where these are heard; lines of the agent alone need no search."""
     only_agent = not any(pattern.said_by_npcs for alternative in heard for pattern, _ in alternative)
@@ -725,7 +705,7 @@ def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
 def words_in_order(
     sentences: Sentences,
     names: Iterable[Term],
-    lines: Mapping[str, Sequence[Line]],
+    lines: Sequence[Line],
     tones: Iterable[Term | None],
 ) -> tuple[str, ...]:
     """The words of the grammar, then of the names, of what each NPC can say, and of tones, by first appearance.
@@ -735,16 +715,16 @@ def words_in_order(
     Args:
         sentences: templates come first, then the words of their slots.
         names: the name of each member of the cast, in order.
-        lines: NPC -> its lines in the order of its frame.
+        lines: of all NPCs, of each in the order of its frame.
         tones: the tone of each entity, None without one.
     """
     texts = chain(
         (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
         (word for slot in sentences.slots for word in slot.words),
         (word for name in names for word in words_of_values(name.type)),
-        (text for said in lines.values() for line in said for text in _pieces(line)),
+        (text for line in lines for text in _pieces(line)),
         (word for tone in tones if tone is not None for word in tone.type.words),
-        ("to" for said in lines.values() for line in said if line.to is not None),
+        ("to" for line in lines if line.to is not None),
     )
     return tuple(dict.fromkeys(word for text in texts for word in words(text)))
 
@@ -758,11 +738,6 @@ def _pieces(line: Line) -> Iterator[str]:
 
 
 def _runs_together(line: Line) -> bool:
-    pairs = zip(line.parts, line.parts[1:], strict=False)
-    return any(_inside_word(a, b) for a, b in pairs)
-
-
-def _inside_word(a: str | Term, b: str | Term) -> bool:
-    before = a[-1:] if isinstance(a, str) else "x"
-    after = b[:1] if isinstance(b, str) else "x"
-    return bool(words(before) and words(after))
+    """Whether somewhere one piece ends and the next begins within a word."""
+    edges = [(part[:1], part[-1:]) if isinstance(part, str) else ("x", "x") for part in line.parts]
+    return any(words(before) and words(after) for (_, before), (after, _) in pairwise(edges))

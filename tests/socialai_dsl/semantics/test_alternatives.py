@@ -157,3 +157,13 @@ def test_a_text_is_the_one_of_the_file_that_was_drawn(meaning, files):
 )  # fmt: skip
 def test_mistakes(mistakes, files, other, said):
     assert mistakes(**files(ONE, other)) == [said]
+
+
+def test_there_is_room_for_what_a_frame_of_a_file_counts(meaning, files):
+    """As in a frame of the scenario itself: by one a turn, over the whole episode."""
+    counting = (
+        "npc: N\nframe: tick\nframes: {tick: {let: {n: 0}, states: {on: {then: [{set: {n: n + 1}}]}}}}\n"
+    )
+    checked = meaning(**files(counting.replace("N", "one"), counting.replace("N", "two")))
+    (counter,) = [item for item in checked.setup if isinstance(item, Drawn) and item.path == "guide.n"]
+    assert counter.type.high >= checked.horizon

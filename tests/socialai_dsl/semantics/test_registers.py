@@ -34,6 +34,13 @@ def test_any_frame_may_set_what_the_world_has(meaning):
     assert register(checked, "state.price") == (3, 7)
 
 
+def test_there_is_room_for_what_each_member_of_a_group_adds(meaning):
+    frames = {"tick": {"states": {"on": {"then": [{"set": {"total": "total + 1"}}]}}}}
+    cast = {"guide": {"count": 4, "frame": "tick"}}
+    high = register(meaning(state={"total": 0}, frames=frames, cast=cast), "state.total")[1]
+    assert high >= 4 * 20
+
+
 def test_a_register_of_a_frame_with_a_range(meaning):
     frames = {
         "sulk": {
