@@ -386,15 +386,13 @@ HIDDEN = int(Flag.NPCS_HIDDEN)
 def part_of(program: Program) -> LinkedProgram:
     """A program with its links into a batch of programs like it."""
     return LinkedProgram(
-        words=program.words,
-        rules=len(program.rules),
+        program,
         outcomes=range(len(program.outcome_table)),
         actions=[*range(7), Body.NONE],
         templates=range(2),
         slots=[range(3)],
         strides=[[0, 1], [0, 1]],
         tokens=range(len(program.vocabulary)),
-        successes=[outcome.success for outcome in program.outcome_table],
     )
 
 

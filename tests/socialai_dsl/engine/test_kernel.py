@@ -179,15 +179,13 @@ def test_ended_rows_wait_where_resets_are_the_callers() -> None:
 def mixed(programs: list[Program], pools: list[list[int]], pool_of_row: list[int]) -> Batch:
     parts = [
         LinkedProgram(
-            program.words,
-            1,
+            program,
             range(4 * i, 4 * i + 4),
             [*range(7), Body.NONE],
             range(2),
             [range(3)],
             [[0, 1], [0, 1]],
             range(22),
-            [False] * 4,
         )
         for i, program in enumerate(programs)
     ]
@@ -236,15 +234,13 @@ def test_actions_of_a_larger_space_that_a_program_lacks() -> None:
     program = Assembly(at=((2, 2),), lines=(("x", (2,), 1),)).program()
     # The batch's order: an action the program lacks, forward, none; a template it lacks, its second.
     part = LinkedProgram(
-        program.words,
-        1,
+        program,
         range(4),
         [Body.NONE, Body.FORWARD, Body.NONE],
         [-1, 1],
         [[0, -1, 2]],
         [[0, 1], [0, 1]],
         range(22),
-        [False] * 4,
     )
     batch = Batch([part], [[0]], [0], 8)
     batch.reset()
