@@ -11,7 +11,7 @@ from socialai_dsl.compiler.lowering import NO_NOTES, NoteTaker, allocate, lower
 from socialai_dsl.compiler.notes import ConditionPart, Note, NotingProgram, Recorder, Value
 from socialai_dsl.compiler.questions import Asking, ProbeNotes, notes_of
 from socialai_dsl.compiler.questions import Text as NotedText
-from socialai_dsl.compiler.tables import Tables, verify
+from socialai_dsl.compiler.tables import program_of, verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -140,6 +140,6 @@ def _compiled(
     checked = replace(checked, properties=(), probes=checked.probes if asking else ())
     allocation = allocate(checked, notes, numbered)
     lowered = lower(allocation)
-    program = Tables(allocation, lowered).program()
+    program = program_of(allocation, lowered)
     verify(program)
     return program, allocation.lines

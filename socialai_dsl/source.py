@@ -136,15 +136,9 @@ def _anchors(text: str, start: int, end: int, style: Style) -> Iterator[tuple[in
     elif style is Style.SINGLE:
         yield from _single_quoted(text, start + 1, end - 1)
     else:
-        if style in (Style.LITERAL, Style.FOLDED):
-            start = _after_header(text, start, end)
+        if style in (Style.LITERAL, Style.FOLDED):  # the text begins behind the header
+            start = next((i for i in range(start, end) if text[i] in "\n\r"), end)
         yield from ((i, 1, text[i]) for i in range(start, end) if text[i] not in _WHITE)
-
-
-def _after_header(text: str, start: int, end: int) -> int:
-    while start < end and text[start] not in "\n\r":
-        start += 1
-    return start
 
 
 def _single_quoted(text: str, start: int, end: int) -> Iterator[tuple[int, int, str]]:

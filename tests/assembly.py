@@ -351,19 +351,16 @@ class Assembly:
 HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
-def part_of(program: Program, first_outcome: int = 0, name: str = "") -> LinkedProgram:
+def part_of(program: Program, first_outcome: int = 0) -> LinkedProgram:
     """A program with its links into a batch of programs like it, in which its outcomes are numbered from the first."""
     return LinkedProgram(
-        words=program.words,
-        rules=len(program.rules),
+        program,
         outcomes=range(first_outcome, first_outcome + len(program.outcome_table)),
         actions=[*range(7), Body.NONE],
         templates=range(2),
         slots=[range(3)],
         strides=[[0, 1], [0, 1]],
         tokens=range(len(program.vocabulary)),
-        successes=[outcome.success for outcome in program.outcome_table],
-        name=name,
     )
 
 

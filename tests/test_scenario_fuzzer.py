@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.compiler.instruction_checks import Ranges
 from socialai_dsl.envs.asking import Asker
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.frontend import load
+from socialai_dsl.program.program import bounds_of
 from tests.agreement import Pair, questions_agree
 from tests.quick import one_in
 from tests.reference.interpreter import Reference
@@ -77,7 +77,7 @@ def play_within(folder: Path, seed: int, steps: int) -> int:
     envs.action_space.seed(seed)
     envs.reset(seed=seed)
     (program,), state = envs.programs, envs._table.state
-    low, high = np.array(Ranges.of(program).of_register).T
+    low, high = np.array(bounds_of(program).of_register).T
     least = most = state.registers[:, : len(low)].copy()
     for step in range(steps):
         envs.step(envs.action_space.sample())

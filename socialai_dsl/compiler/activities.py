@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from socialai_dsl.compiler.assembler import NOWHERE, Label, constant, entity_register, label
 from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.hands import is_member
@@ -21,14 +19,6 @@ from socialai_dsl.semantics.terms import (
     Term,
 )
 
-_BODIES = {
-    "left": Body.LEFT,
-    "right": Body.RIGHT,
-    "forward": Body.FORWARD,
-    "toggle": Body.TOGGLE,
-    "pickup": Body.PICKUP,
-    "drop": Body.DROP,
-}
 _TO_A_PLACE = ("go_to", "go_next_to", "enter")
 GOING = (*_TO_A_PLACE, "search")
 """Activities that take no step when they are fulfilled before they begin."""
@@ -78,40 +68,37 @@ class Activities:
         self.aim = aim
         self.turn = to.sites.row(f"cast.{label(checked.entities[entity])}.turn")
 
-    def emit(self, activity: Activity) -> None:
-        """Choose the body action; `stay` chooses none, and so does an activity whose argument finds nothing."""
-        self._or_nothing(activity, self._emit, lambda: self.to.block.emit(Op.BODY, constant(Body.NONE)))
+    def emit(self, activity: Activity, acting: bool = True) -> None:
+        """Choose the body action, or unless `acting` only note what the activity of this turn is about.
 
-    def note(self, activity: Activity) -> None:
-        """Only note what `emit` would: what the activity of this turn is about."""
-        self._or_nothing(activity, self._emit_note, lambda: None)
-
-    def _or_nothing(
-        self, activity: Activity, emit: Callable[[Activity], None], otherwise: Callable[[], None]
-    ) -> None:
-        """What is to be done in this turn, or something else if the argument of the activity finds nothing."""
+        `stay` chooses none, and so does an activity whose argument finds nothing.
+        """
         to, block = self.to, self.to.block
         to.site, block.span = activity.site, activity.span
         nothing, done = Label(), Label()
         to.failed = nothing
-        emit(activity)
+        if acting:
+            self._emit(activity)
+        else:
+            self._note_aim(activity)
         to.failed = None
         if nothing.uses:
             block.skip(done)
             block.bind(nothing)
             if self.aim is not None:
                 block.emit(Op.LOAD, self.aim, constant(NOTHING))
-            otherwise()
+            if acting:
+                block.emit(Op.BODY, constant(Body.NONE))
             block.bind(done)
 
-    def _emit_note(self, activity: Activity) -> None:
+    def _note_aim(self, activity: Activity) -> None:
         to, block = self.to, self.to.block
         own, done = constant(self.entity), Label()
         if activity.name not in ACTS:
             self._aimed_at(activity)
             return
         if activity.name in OF_HANDS:
-            self._use_hands(activity, lambda choose: None)
+            self._use_hands(activity, acting=False)
             return
         self._note(GETTING_THERE)
         if activity.name == "use":
@@ -132,7 +119,7 @@ class Activities:
             case "stay":
                 block.emit(Op.BODY, constant(Body.NONE))
             case "left" | "right" | "forward" | "toggle" | "pickup" | "drop":
-                block.emit(Op.BODY, constant(_BODIES[activity.name]))
+                block.emit(Op.BODY, constant(Body[activity.name.upper()]))
             case "face":
                 self._face(to.value(activity.args[0]))
             case "turn_to":
@@ -147,7 +134,7 @@ class Activities:
                 self._note(GETTING_THERE)
                 self._use(to.value(activity.args[0]), noting=True)
             case "fetch" | "give" | "bring":
-                self._use_hands(activity, lambda choose: choose())
+                self._use_hands(activity, acting=True)
             case "search":
                 self._search(activity)
             case "enter":
@@ -232,11 +219,8 @@ class Activities:
         block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.bind(done)
 
-    def _use_hands(self, activity: Activity, act: Callable[[Callable[[], None]], None]) -> None:
-        """Fetch a thing, unless it is carried already, and take it where it is to go.
-
-        `act` gets what chooses the body action, and does it or leaves it alone.
-        """
+    def _use_hands(self, activity: Activity, acting: bool) -> None:
+        """Fetch a thing, unless it is carried already, and take it where it is to go; unless `acting` only note it."""
         to, block = self.to, self.to.block
         own = constant(1 + self.entity)
         what, *where = (to.value(arg) for arg in activity.args)
@@ -250,39 +234,41 @@ class Activities:
             block.test(Op.IF_EQ, carrier, to.into_temporary(Op.ADD, where[0], constant(1)), other)
         else:
             block.test(Op.IF_SAME_CELL, what, where[0], other)
-        self._stand_still(act, done)
+        self._stand_still(acting, done)
         block.bind(other)
         self._note(GETTING_THERE)
         lacking = Label()
         if where:
             block.test(Op.IF_EQ, carrier, own, lacking)
-            self._approach(where[0], Body.DROP, act, done)
+            self._approach(where[0], Body.DROP, acting, done)
             block.bind(lacking)
         if activity.name == "give":
-            self._stand_still(act, done)
+            self._stand_still(acting, done)
         else:
             full = Label()
             self._while_empty_handed(full)
-            self._approach(what, Body.PICKUP, act, done)
+            self._approach(what, Body.PICKUP, acting, done)
             block.bind(full)
-            self._stand_still(act, done)
+            self._stand_still(acting, done)
         block.bind(done)
 
-    def _stand_still(self, act: Callable[[Callable[[], None]], None], done: Label) -> None:
-        act(lambda: self.to.block.emit(Op.BODY, constant(Body.NONE)))
+    def _stand_still(self, acting: bool, done: Label) -> None:
+        if acting:
+            self.to.block.emit(Op.BODY, constant(Body.NONE))
         self.to.block.skip(done)
 
-    def _approach(
-        self, goal: int, body: Body, act: Callable[[Callable[[], None]], None], done: Label
-    ) -> None:
+    def _approach(self, goal: int, body: Body, acting: bool, done: Label) -> None:
         """Go next to the goal, face it, act; then on to `done`."""
         block, own = self.to.block, constant(self.entity)
         with block.when(Op.IF_NEXT_TO, own, goal, then=done):
             with block.when(Op.IF_FACES, own, goal, then=done):
                 self._note(ACTING)
-                act(lambda: block.emit(Op.BODY, constant(body)))
-            act(lambda: self._face(goal))
-        act(lambda: block.emit(Op.GO_NEXT_TO, own, goal, self.turn))
+                if acting:
+                    block.emit(Op.BODY, constant(body))
+            if acting:
+                self._face(goal)
+        if acting:
+            block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.skip(done)
 
     def _while_empty_handed(self, otherwise: Label) -> None:
@@ -368,11 +354,9 @@ class Activities:
         block = self.to.block
         done = Label()
         for k, (move, utterance) in enumerate(_elements(activity)):
-            mark = block.taken
-            with block.when(Op.IF_EQ, self.clock, constant(k), then=done):
+            with block.scratch(), block.when(Op.IF_EQ, self.clock, constant(k), then=done):
                 block.emit(Op.BODY, self.to.value(move))
                 self.lines.perform(self.to, self.checked.entities[self.entity], utterance)
-            block.release(mark)
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 
@@ -410,38 +394,37 @@ class Activities:
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
-        mark = block.taken
-        to.failed = nothing
-        if activity.name == "perform":
-            block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
-        elif activity.name in ACTS:
-            assert self.aim is not None, "internal: the end of an act asks what was noted"
-            block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
-            ended = Label()
-            if activity.name in OF_HANDS:
-                block.unless(Op.IF_EQ, self.aim, constant(FULFILLED), ended)
-            block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
-            # A scripted agent's frame follows what the agent has really done.
-            act = constant(_ACT_OF[activity.name])
-            block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), act, otherwise)
-            if activity.name == "fetch":
-                empty = Label()
-                self._while_empty_handed(empty)
-                block.skip(otherwise)
-                block.bind(empty)
-            elif activity.name in OF_HANDS:
-                self._while_empty_handed(otherwise)
-            block.bind(ended)
-        elif activity.name == "search":
-            self._unless_seen(activity, otherwise)
-        elif activity.name == "turn_to":
-            facing = entity_register(self.entity, Field.DIR)
-            block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)
-        else:
-            op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
-            block.test(op, own, self._goal(activity, nothing), otherwise)
-        to.failed = None
-        block.release(mark)
+        with block.scratch():
+            to.failed = nothing
+            if activity.name == "perform":
+                block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
+            elif activity.name in ACTS:
+                assert self.aim is not None, "internal: the end of an act asks what was noted"
+                block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
+                ended = Label()
+                if activity.name in OF_HANDS:
+                    block.unless(Op.IF_EQ, self.aim, constant(FULFILLED), ended)
+                block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
+                # A scripted agent's frame follows what the agent has really done.
+                act = constant(_ACT_OF[activity.name])
+                block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), act, otherwise)
+                if activity.name == "fetch":
+                    empty = Label()
+                    self._while_empty_handed(empty)
+                    block.skip(otherwise)
+                    block.bind(empty)
+                elif activity.name in OF_HANDS:
+                    self._while_empty_handed(otherwise)
+                block.bind(ended)
+            elif activity.name == "search":
+                self._unless_seen(activity, otherwise)
+            elif activity.name == "turn_to":
+                facing = entity_register(self.entity, Field.DIR)
+                block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)
+            else:
+                op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
+                block.test(op, own, self._goal(activity, nothing), otherwise)
+            to.failed = None
 
     def _goal(self, activity: Activity, nothing: Label) -> int:
         """What the activity of this turn was about; without a note of it what it is about now."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -65,14 +65,18 @@ class Sites:
 
 
 class Block:
-    """A piece of code under construction; falls through top-down and ends with HALT."""
+    """A piece of code under construction; falls through top-down and ends with HALT.
+
+    Attributes:
+        taken, boards_taken: how many temporaries and boards are in use; they are given back like a stack.
+    """
 
     def __init__(self) -> None:
         self.instructions: list[list[int]] = []
         self.spans: list[Span | None] = []
         self.span: Span | None = None
-        self._temporaries = 0
-        self._boards = 0
+        self.taken = 0
+        self.boards_taken = 0
 
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
         """Append an instruction, attributed to `self.span`."""
@@ -141,36 +145,27 @@ class Block:
 
     def temporary(self, count: int = 1) -> int:
         """The first of `count` fresh temporaries, as an operand."""
-        first = self._temporaries
-        self._temporaries += count
-        assert self._temporaries <= TEMPORARIES, (
-            "internal: an expression needs more temporaries than the engine has"
-        )
+        first = self.taken
+        self.taken += count
+        assert self.taken <= TEMPORARIES, "internal: an expression needs more temporaries than the engine has"
         return TEMPORARY + first
 
-    def release(self, mark: int) -> None:
-        """Give back the temporaries taken since `mark = block.taken`."""
-        self._temporaries = mark
-
-    @property
-    def taken(self) -> int:
-        """How many temporaries are in use."""
-        return self._temporaries
+    @contextmanager
+    def scratch(self) -> Iterator[None]:
+        """The temporaries that are taken within are given back."""
+        mark = self.taken
+        yield
+        self.taken = mark
 
     def board(self) -> int:
         """A fresh board."""
-        self._boards += 1
-        assert self._boards <= BOARDS, "internal: a set of cells needs more boards than the engine has"
-        return self._boards - 1
+        self.boards_taken += 1
+        assert self.boards_taken <= BOARDS, "internal: a set of cells needs more boards than the engine has"
+        return self.boards_taken - 1
 
     def release_boards(self, mark: int) -> None:
         """Give back the boards from number `mark` on."""
-        self._boards = mark
-
-    @property
-    def boards_taken(self) -> int:
-        """How many boards are in use."""
-        return self._boards
+        self.boards_taken = mark
 
 
 class CodeTable:
@@ -276,35 +271,15 @@ class Registers:
         width, height = self.canvas
         return replace(type_, low=NOWHERE, high=CELL + 32 * (height - 1) + width - 1)
 
+    def named(self, path: str) -> RegisterName:
+        """The register of a path, with its range."""
+        return next(name for name in self.names if name.path == path)
+
     def reserve(self, count: int) -> int:
         """The first of `count` registers without a name."""
         first = self.next_free
         self.next_free += count
         return first
-
-
-def store(
-    registers: Registers,
-    emit: Callable[..., None],
-    path: str,
-    value: int,
-    is_nothing: bool = False,
-    key: tuple[int, int] | None = None,
-) -> None:
-    """Put a temporary into a register; those that hold plain integers saturate, unless it is nothing that is put there.
-
-    Of a row of registers `path` is that of the first, and `key` the operands of `Op.STORE_AT` that say which is meant.
-    """
-    name = next(name for name in registers.names if name.path == path)
-    assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
-    if not name.values and not is_nothing:
-        # "No cell" is a value of its own; a register of cells that may be empty stores it as the number of nothing.
-        emit(Op.MAX, value, value, constant(name.low if name.kind == "cell" else name.least))
-        emit(Op.MIN, value, value, constant(name.high))
-    if key is None:
-        emit(Op.LOAD, name.register, value)
-    else:
-        emit(Op.STORE_AT, value, *key)
 
 
 def label(entity: Entity) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from socialai_dsl.compiler.assembler import Label, age_path, constant, store
+from socialai_dsl.compiler.assembler import Label, age_path, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.plans import BeliefPlan
@@ -25,19 +25,18 @@ def _perceive_one(to: Expressions, sources: Iterator[BeliefPlan]) -> None:
     forgets = age is not None or listed[0].forget is not None
     for belief in listed:
         unseen = Label()
-        mark = block.taken
-        if belief.when is not None:
-            to.sited_condition(belief.when, unseen)
-        to.failed = unseen
-        value = to.sited_copy(belief.value)
-        to.failed = None
-        store(to.registers, block.emit, belief.path, value)
-        if age is not None:
-            block.emit(Op.LOAD, age, constant(0))
-        if forgets or belief is not listed[-1]:
-            block.skip(done)
-        block.bind(unseen)
-        block.release(mark)
+        with block.scratch():
+            if belief.when is not None:
+                to.sited_condition(belief.when, unseen)
+            to.failed = unseen
+            value = to.sited_copy(belief.value)
+            to.failed = None
+            to.store(belief.path, value)
+            if age is not None:
+                block.emit(Op.LOAD, age, constant(0))
+            if forgets or belief is not listed[-1]:
+                block.skip(done)
+            block.bind(unseen)
     if forgets:
         _forget(to, listed[0], age, done)
     block.bind(done)
@@ -46,14 +45,13 @@ def _perceive_one(to: Expressions, sources: Iterator[BeliefPlan]) -> None:
 def _forget(to: Expressions, belief: BeliefPlan, age: int | None, done: Label) -> None:
     """Without any source: a belief ends after a number of turns, or on a condition."""
     block = to.block
-    mark = block.taken
-    if age is not None:
-        older = to.into_temporary(Op.ADD, age, constant(1))
-        block.emit(Op.MIN, age, older, constant(belief.lasts))
-        block.test(Op.IF_EQ, age, constant(belief.lasts), done)
-    if belief.forget is not None:
-        to.sited_condition(belief.forget, done)
-    name = next(name for name in to.registers.names if name.path == belief.path)
-    assert name.nothing is not None, "internal: what is forgotten can be nothing"
-    block.emit(Op.LOAD, name.register, to.number(name.nothing))
-    block.release(mark)
+    with block.scratch():
+        if age is not None:
+            older = to.into_temporary(Op.ADD, age, constant(1))
+            block.emit(Op.MIN, age, older, constant(belief.lasts))
+            block.test(Op.IF_EQ, age, constant(belief.lasts), done)
+        if belief.forget is not None:
+            to.sited_condition(belief.forget, done)
+        name = to.registers.named(belief.path)
+        assert name.nothing is not None, "internal: what is forgotten can be nothing"
+        block.emit(Op.LOAD, name.register, to.number(name.nothing))

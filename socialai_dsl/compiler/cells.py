@@ -5,12 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 from socialai_dsl.compiler.assembler import LARGEST, NOWHERE, Block, Label, Registers, Sites, constant
-from socialai_dsl.compiler.folding import TRUE, Classes, Facts, fold, leaving, mentions, substitute
-from socialai_dsl.program import CELL, Counting, Field, Op, Register
+from socialai_dsl.compiler.folding import TRUE, Classes, Facts, Mobility, fold, mentions, substitute
+from socialai_dsl.program import CELL, TEMPORARY, Counting, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.terms import (
@@ -76,14 +76,16 @@ class Emitter(ABC):
 
     @cached_property
     def leaving(self) -> frozenset[int]:
-        """The entities of which it is still written down where they were when they are out of the room."""
-        return leaving(self.checked)
+        """The entities that leave the room at some time: of these it is still written down where they were.
+
+        Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
+        """
+        return frozenset(Mobility(self.checked).vanishing)
 
     def condition(self, term: Term, otherwise: Label) -> None:
         """Fall through if `term` holds, else skip to `otherwise`."""
-        mark = self.block.taken
-        self.test(term, otherwise)
-        self.block.release(mark)
+        with self.block.scratch():
+            self.test(term, otherwise)
 
     def one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
         """Whether a class (or state) is among these numbers."""
@@ -109,6 +111,25 @@ class Emitter(ABC):
             return value
         value = self.into_temporary(Op.MAX, value, self.number(term.type.low))
         return self.into_temporary(Op.MIN, value, self.number(term.type.high))
+
+    def store(
+        self, path: str, value: int, is_nothing: bool = False, key: tuple[int, int] | None = None
+    ) -> None:
+        """Put a temporary into a register; those that hold plain integers saturate, unless nothing is put there.
+
+        Of a row of registers `path` is that of the first, and `key` the operands of `Op.STORE_AT` that say which is
+        meant.
+        """
+        name, emit = self.registers.named(path), self.block.emit
+        assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
+        if not name.values and not is_nothing:
+            # "No cell" is a value of its own; a register of cells that may be empty stores it as the number of nothing.
+            emit(Op.MAX, value, value, constant(name.low if name.kind == "cell" else name.least))
+            emit(Op.MIN, value, value, constant(name.high))
+        if key is None:
+            emit(Op.LOAD, name.register, value)
+        else:
+            emit(Op.STORE_AT, value, *key)
 
     def number(self, value: int) -> int:
         """The operand of a known value: a constant, or computed where it is too large for one."""
@@ -139,24 +160,23 @@ def keep_each(to: Emitter, board: int, condition: Term, name: str = "") -> None:
     """Take out of `board` the cells for which `condition` is false."""
     assert to.loop is None, "internal: a loop over cells inside another"
     block = to.block
-    mark = block.taken
-    first = block.temporary(3)
-    keep, drop = Label(), Label()
-    to.loop = LoopCell(name, first, first + 1, first + 2)
-    failed = to.failed
-    if failed is not None:
-        to.failed = drop  # nothing skips out of a loop
-    start = len(block.instructions)
-    block.emit(Op.EACH_CELL, board, first)
-    to.condition(condition, drop)
-    block.skip(keep)
-    block.bind(drop)
-    block.emit(Op.DROP_CELL)
-    block.bind(keep)
-    block.instructions[start][3] = len(block.instructions) - start - 1
-    block.emit(Op.END_EACH)
-    to.loop, to.failed = None, failed
-    block.release(mark)
+    with block.scratch():
+        first = block.temporary(3)
+        keep, drop = Label(), Label()
+        to.loop = LoopCell(name, first, first + 1, first + 2)
+        failed = to.failed
+        if failed is not None:
+            to.failed = drop  # nothing skips out of a loop
+        start = len(block.instructions)
+        block.emit(Op.EACH_CELL, board, first)
+        to.condition(condition, drop)
+        block.skip(keep)
+        block.bind(drop)
+        block.emit(Op.DROP_CELL)
+        block.bind(keep)
+        block.instructions[start][3] = len(block.instructions) - start - 1
+        block.emit(Op.END_EACH)
+        to.loop, to.failed = None, failed
 
 
 def count_cells(to: Emitter, term: terms.Quantification, opposite: bool = False) -> int:
@@ -296,23 +316,23 @@ def _is_shape(to: Emitter, where: Term, variable: str) -> bool:
 def _shape(to: Emitter, where: Term, variable: str) -> int:
     """A fresh board with the cells that such a condition holds for, whatever is there."""
     block = to.block
-    mark, board = block.taken, block.board()
-    match where:
-        case terms.Test(name="in_front_of", object=thing):
-            block.emit(Op.B_IN_FRONT_OF, board, to.value(thing))
-        case terms.Test(name="next_to", object=thing):
-            block.emit(Op.B_NEXT_TO, board, to.value(thing))
-        case terms.Test(name="at", object=thing):
-            _fill_cell_of(to, board, to.value(thing))
-        case terms.Test(object=thing):
-            _fill_lines_of(to, board, to.value(thing))
-        case terms.Compare(op=op, left=left, right=right):
-            name = _coordinate(left, variable)
-            if name is not None:
-                _fill_side(to, board, name, op, _GREATEST, to.value(right))
-            else:
-                _fill_side(to, board, _coordinate(right, variable), op, _LEAST, to.value(left))
-    block.release(mark)
+    board = block.board()
+    with block.scratch():
+        match where:
+            case terms.Test(name="in_front_of", object=thing):
+                block.emit(Op.B_IN_FRONT_OF, board, to.value(thing))
+            case terms.Test(name="next_to", object=thing):
+                block.emit(Op.B_NEXT_TO, board, to.value(thing))
+            case terms.Test(name="at", object=thing):
+                _fill_cell_of(to, board, to.value(thing))
+            case terms.Test(object=thing):
+                _fill_lines_of(to, board, to.value(thing))
+            case terms.Compare(op=op, left=left, right=right):
+                name = _coordinate(left, variable)
+                if name is not None:
+                    _fill_side(to, board, name, op, _GREATEST, to.value(right))
+                else:
+                    _fill_side(to, board, _coordinate(right, variable), op, _LEAST, to.value(left))
     return board
 
 
@@ -340,12 +360,11 @@ def _is_mentioned(term: Term, variable: str) -> bool:
 
 def fill_rectangle(block: Block, board: int, bounds: Sequence[int], counting: Counting) -> None:
     """Let a board be the cells that count and whose x and y lie between bounds, given as in `EVERYWHERE`."""
-    mark = block.taken
-    corner = block.temporary(4)
-    for i, bound in enumerate(bounds):
-        block.emit(Op.LOAD, corner + i, bound)
-    block.emit(Op.B_RECT, board, corner, counting)
-    block.release(mark)
+    with block.scratch():
+        corner = block.temporary(4)
+        for i, bound in enumerate(bounds):
+            block.emit(Op.LOAD, corner + i, bound)
+        block.emit(Op.B_RECT, board, corner, counting)
 
 
 def _fill_cell_of(to: Emitter, board: int, thing: int) -> None:
@@ -442,10 +461,9 @@ def _but_one(term: terms.Quantification) -> terms.Term | None:
             (terms.Const() | terms.Read(nothing=None) | terms.FieldOf(entity=Const())) as one,
         ):
             first, last = term.items[0].value, term.items[-1].value
-            in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
             among = first <= one.type.low and one.type.high <= last
             fits = first >= 0 and last <= _LAST_OTHER and 1 < len(term.items) <= _MOST_OTHERS
-            if name == term.variable and in_a_row and among and fits:
+            if name == term.variable and in_a_row([item.value for item in term.items]) and among and fits:
                 return one
     return None
 
@@ -493,10 +511,15 @@ def _nth(to: Emitter, term: terms.Quantification, left: int) -> int:
     return result
 
 
+def in_a_row(numbers: Sequence[int]) -> bool:
+    """Whether each number is one more than that before it."""
+    return list(numbers) == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
 def _item(to: Emitter, items: tuple[Const, ...], position: int) -> int:
     """The item at a position that is in a temporary."""
     values = [item.value for item in items]
-    if values == list(range(values[0], values[0] + len(values))):
+    if in_a_row(values):
         return to.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
     result = to.into_temporary(Op.LOAD, constant(values[0]))
     for i, value in enumerate(values[1:], 1):
@@ -510,8 +533,7 @@ def nearest_thing(to: Emitter, term: terms.Quantification) -> int:
     assert term.to is not None
     block, items = to.block, term.items
     first, last = items[0].value, items[-1].value
-    in_a_row = [item.value for item in items] == list(range(first, last + 1))
-    if term.condition is None and in_a_row and last <= _LAST_NEAREST:
+    if term.condition is None and in_a_row([item.value for item in items]) and last <= _LAST_NEAREST:
         found = to.into_temporary(Op.NEAREST, to.value(term.to), first << 8 | last)
         if to.failed is not None:
             block.test(Op.IF_LE, constant(0), found, to.failed)
@@ -526,14 +548,13 @@ def nearest_thing(to: Emitter, term: terms.Quantification) -> int:
         least = _far(to)
     for item in items:
         following = Label()
-        mark = block.taken
-        to.condition(to.instance(term, item), following)
-        distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
-        block.test(Op.IF_LT, distance, least, following)
-        block.emit(Op.LOAD, least, distance)
-        block.emit(Op.LOAD, result, constant(item.value))
-        block.bind(following)
-        block.release(mark)
+        with block.scratch():
+            to.condition(to.instance(term, item), following)
+            distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
+            block.test(Op.IF_LT, distance, least, following)
+            block.emit(Op.LOAD, least, distance)
+            block.emit(Op.LOAD, result, constant(item.value))
+            block.bind(following)
     if to.failed is not None:
         block.test(Op.IF_LT, least, _far(to), to.failed)
     return result
@@ -572,9 +593,8 @@ def selected_value(to: Emitter, term: Select) -> int:
     result = to.block.temporary()
 
     def take(value: Term) -> None:
-        mark = to.block.taken
-        to.block.emit(Op.LOAD, result, to.value(value))
-        to.block.release(mark)
+        with to.block.scratch():
+            to.block.emit(Op.LOAD, result, to.value(value))
 
     if switch is not None and all(
         isinstance(value, Const | Read) and not may_find_nothing(value) for value in switch.cases
@@ -617,18 +637,18 @@ def _branches(to: Emitter, term: Select, switch: _Switch | None, take: Callable[
     """Test one condition after the other; what needs most words to ask for comes last and is not asked for."""
     block = to.block
     done = Label()
-    branches: list[tuple[Callable[[Label], None], Term]] = []
+    branches: list[tuple[Callable[[Label], None], Term]]
     if switch is None:
         last = term.default
-        for condition, value in zip(term.conditions, term.values, strict=True):
-            branches.append((lambda to_next, asked=condition: to.condition(asked, to_next), value))  # type: ignore[misc]
+        asked = [partial(to.condition, condition) for condition in term.conditions]
+        branches = list(zip(asked, term.values, strict=True))
     else:
         last, key = _commonest(switch), to.value(switch.key)
-        for value, numbers in switch.cases.items():
-            if value != last:
-                branches.append(
-                    (lambda to_next, taken=numbers: among(to, key, switch.key.type, taken, to_next), value)  # type: ignore[misc]
-                )
+        branches = [
+            (partial(among, to, key, switch.key.type, numbers), value)
+            for value, numbers in switch.cases.items()
+            if value != last
+        ]
     for ask, value in branches:
         following = Label()
         ask(following)

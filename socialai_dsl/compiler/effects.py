@@ -18,7 +18,6 @@ from socialai_dsl.compiler.assembler import (
     found_path,
     label,
     said_path,
-    store,
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
@@ -35,7 +34,6 @@ from socialai_dsl.semantics.plans import (
     Effect,
     Entity,
     FramePlan,
-    MemoryPlan,
     RulePlan,
     StepPlan,
 )
@@ -147,13 +145,12 @@ def _reserve(thing: Entity, mobility: Mobility, registers: Registers, entities: 
 
 def _save_cell(block: Block, number: int, register: int) -> None:
     """The cell, also of what is not in the room because it lies in something."""
-    mark = block.taken
-    cell = block.temporary()
-    block.emit(Op.MUL, cell, entity_register(number, Field.Y), constant(ROW))
-    block.emit(Op.ADD, cell, cell, entity_register(number, Field.X))
-    block.emit(Op.ADD, cell, cell, constant(CELL))
-    block.emit(Op.MAX, register, cell, constant(NOWHERE))
-    block.release(mark)
+    with block.scratch():
+        cell = block.temporary()
+        block.emit(Op.MUL, cell, entity_register(number, Field.Y), constant(ROW))
+        block.emit(Op.ADD, cell, cell, entity_register(number, Field.X))
+        block.emit(Op.ADD, cell, cell, constant(CELL))
+        block.emit(Op.MAX, register, cell, constant(NOWHERE))
 
 
 # -- effects: all values are computed before anything changes ------------------------------------------------
@@ -220,14 +217,6 @@ class Effects:
         self.to, self.lines, self.homes, self.read = to, lines, homes, read
         self.checked, self.registers = to.checked, to.registers
 
-    def emit(
-        self, what: RulePlan | StepPlan, counter: int, failed: Label, speaker: Entity | None = None
-    ) -> None:
-        """Compute all values first (a pick that finds nothing skips to `failed`), then act: set, cause, say."""
-        operands = self.compute(what, failed, speaker)
-        self.to.block.emit(Op.COUNT, counter)
-        self.carry_out(what, operands, speaker)
-
     def compute(self, what: RulePlan | StepPlan, failed: Label, speaker: Entity | None) -> Operands:
         """Compute all values; a pick that finds nothing skips to `failed`."""
         to = self.to
@@ -268,7 +257,7 @@ class Effects:
         only = Choice(block, operands.chosen).of if operands.chosen else nullcontext
         for item, operand, key in zip(what.sets, operands.sets, operands.keys, strict=True):
             with only(item.only):
-                store(self.registers, block.emit, item.paths[0], operand, _empties(item), key)
+                self.to.store(item.paths[0], operand, _empties(item), key)
         if any(path in self.read for item in what.sets for path in item.paths):
             block.emit(Op.LOAD, Register.CHANGED, constant(1))
         if isinstance(what, RulePlan) and what.reward:
@@ -301,26 +290,22 @@ class Effects:
             assert effect.value is not None, "internal: `move_into` says into what"
             move_into(self.to, term, entity, effect.value, value)
         else:
-            block.emit(Op.PLACE, entity, self._cell(effect, value))
-
-    def _cell(self, effect: Effect, value: int) -> int:
-        """Where to put something: what has left the room is on no cell any more."""
-        assert effect.value is not None, "internal: `put` says where"
-        entity = effect.value.type.kind == "entity"
-        return self.to.into_temporary(Op.CELL_OF, value) if entity else value
+            assert effect.value is not None, "internal: `put` says where"
+            if effect.value.type.kind == "entity":  # what has left the room is on no cell any more
+                value = self.to.into_temporary(Op.CELL_OF, value)
+            block.emit(Op.PLACE, entity, value)
 
     def _change(self, effect: Effect, term: Term, entity: int) -> None:
         """Open, close, lock, reveal; unlock only what is locked."""
         block = self.to.block
-        thing = self.checked.entities[numbers_of(term)[0]]
-        assert thing.type is not None, "internal: only objects have a status"
-        states = thing.type.states
+        kind = _type(self.checked.entities[numbers_of(term)[0]])
+        states = kind.states
         if effect.name != "unlock":
             block.emit(Op.BECOME, entity, constant(states.index(_TARGETS[effect.name])))
             return
         status = self.to.into_temporary(Op.FIELD, entity, Field.STATUS)
         with block.when(Op.IF_EQ, status, constant(states.index("locked"))):
-            block.emit(Op.BECOME, entity, constant(thing.type.unlocked))
+            block.emit(Op.BECOME, entity, constant(kind.unlocked))
 
     def _reset(self, term: Term, entity: int) -> None:
         """Back to what it was at first, which may differ from one object of a group to the next."""
@@ -339,18 +324,15 @@ class Effects:
         self._put_back(things[-1], entity)
         block.bind(done)
 
-    def _restart(self, thing: Entity) -> None:
-        """Its timer counts from the beginning."""
-        timer = self.registers.by_path.get(f"{label(thing)}.timer")
-        if timer is not None:
-            self.to.block.emit(Op.LOAD, timer, constant(0))
-
     def _put_back(self, thing: Entity, entity: int) -> None:
         self._become_initial(thing, entity)
         self.homes.put_back(self.to, thing.number)
 
     def _become_initial(self, thing: Entity, entity: int) -> None:
-        self._restart(thing)
+        """Its status is the first, and its timer counts from the beginning."""
+        timer = self.registers.by_path.get(f"{label(thing)}.timer")
+        if timer is not None:
+            self.to.block.emit(Op.LOAD, timer, constant(0))
         if thing.role == "object":
             status = constant(thing.status) if thing.initial is None else self.to.value(thing.initial)
             self.to.block.emit(Op.BECOME, entity, status)
@@ -374,7 +356,8 @@ def remember(to: Expressions) -> None:
     for item in to.checked.remembered:
         _remember(to, item)
     for memory in to.checked.memories:
-        _ask_whether_open(to, memory)
+        if memory.open is not None:
+            _note_whether(to, f"{memory.path}.open", memory.open)
     for entity in to.checked.entities:
         said = to.registers.by_path.get(said_path(entity))
         if said is not None:
@@ -388,25 +371,19 @@ def _remember(to: Expressions, item: Drawn) -> None:
     if found is None and item.type.kind == "bool":
         _note_whether(to, item.path, item.value)
         return
-    mark = block.taken
-    if found is not None:
-        block.emit(Op.LOAD, found, constant(0))
-        # `accepts` reads the condition alone, without `found`.
-        if item.type.kind == "bool":
-            block.emit(Op.LOAD, to.registers.by_path[item.path], constant(0))
-        to.failed = missing
-    value = to.sited_copy(item.value)
-    to.failed = None
-    store(to.registers, block.emit, item.path, value)
-    if found is not None:
-        block.emit(Op.LOAD, found, constant(1))
-    block.bind(missing)
-    block.release(mark)
-
-
-def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
-    if memory.open is not None:
-        _note_whether(to, f"{memory.path}.open", memory.open)
+    with block.scratch():
+        if found is not None:
+            block.emit(Op.LOAD, found, constant(0))
+            # `accepts` reads the condition alone, without `found`.
+            if item.type.kind == "bool":
+                block.emit(Op.LOAD, to.registers.by_path[item.path], constant(0))
+            to.failed = missing
+        value = to.sited_copy(item.value)
+        to.failed = None
+        to.store(item.path, value)
+        if found is not None:
+            block.emit(Op.LOAD, found, constant(1))
+        block.bind(missing)
 
 
 def _note_whether(to: Expressions, path: str, condition: SitedTerm) -> None:
@@ -430,10 +407,9 @@ def push_acts(to: Expressions) -> None:
             for place, newer in zip(places, (*places[1:], newest), strict=True):
                 block.emit(Op.LOAD, place, newer)
         filled = by_path[f"{memory.path}.filled"]
-        mark = block.taken
-        more = to.into_temporary(Op.ADD, filled, constant(1))
-        block.emit(Op.MIN, filled, more, constant(memory.length))
-        block.release(mark)
+        with block.scratch():
+            more = to.into_temporary(Op.ADD, filled, constant(1))
+            block.emit(Op.MIN, filled, more, constant(memory.length))
         block.bind(shut)
 
 
@@ -472,7 +448,8 @@ class DeferredRules:
         kept = self._kept[self.rules.index(rule)]
         for part, operand in zip(kept.each(), operands.each(), strict=True):
             if part.register is not None:
-                _keep(to, part, operand)
+                with to.block.scratch():
+                    to.block.emit(Op.LOAD, part.register, _cut(to, operand, part))
         to.block.emit(Op.LOAD, self._pending, constant(1 + self.rules.index(rule)))
 
     def is_pending(self, rule: RulePlan) -> tuple[int, int]:
@@ -494,7 +471,7 @@ class DeferredRules:
     def _room(self, rule: RulePlan) -> Values[_Kept]:
         sets = []
         for item in rule.sets:
-            name = next(name for name in self.registers.names if name.path == item.paths[0])
+            name = self.registers.named(item.paths[0])
             sets.append(self._kept_range(name.low, name.high))
         line = None if rule.say is None else self._kept_range(*self.lines.bounds(self.speaker, rule.say))
         return Values(
@@ -534,13 +511,6 @@ def _has_more(rule: RulePlan) -> bool:
     return rule.do is not None and bool(more)
 
 
-def _keep(to: Expressions, kept: _Kept, operand: int) -> None:
-    assert kept.register is not None, "internal: a known value is not kept"
-    mark = to.block.taken
-    to.block.emit(Op.LOAD, kept.register, _cut(to, operand, kept))
-    to.block.release(mark)
-
-
 def _fetch(to: Expressions, kept: _Kept) -> int:
     return constant(kept.low) if kept.register is None else _cut(to, kept.register, kept)
 
@@ -578,8 +548,7 @@ def _unlock(to: Expressions, switch: Entity) -> None:
     _works(to, switch, following)
     for target in lockable:
         with to.block.when(Op.IF_EQ, _status(target), constant(_state(target, "locked"))):
-            assert target.type is not None, "internal: only objects can be locked"
-            to.block.emit(Op.BECOME, constant(target.number), constant(target.type.unlocked))
+            to.block.emit(Op.BECOME, constant(target.number), constant(_type(target).unlocked))
     to.block.bind(following)
 
 
@@ -630,15 +599,14 @@ def _hold_back(to: Expressions, thing: Entity) -> None:
         return
     block = to.block
     block.span = thing.span
-    mark = block.taken
-    held = block.temporary()
-    block.emit(Op.LOAD, held, constant(0))
-    for other in others:
-        initial = constant(other.status) if other.initial is None else to.value(other.initial)
-        with block.when(Op.IF_NE, _status(other), initial):
-            block.emit(Op.LOAD, held, constant(1))
-    block.emit(Op.SET_FIELD, constant(thing.number), Field.POKED, held)
-    block.release(mark)
+    with block.scratch():
+        held = block.temporary()
+        block.emit(Op.LOAD, held, constant(0))
+        for other in others:
+            initial = constant(other.status) if other.initial is None else to.value(other.initial)
+            with block.when(Op.IF_NE, _status(other), initial):
+                block.emit(Op.LOAD, held, constant(1))
+        block.emit(Op.SET_FIELD, constant(thing.number), Field.POKED, held)
 
 
 def _works(to: Expressions, switch: Entity, otherwise: Label) -> None:
@@ -662,7 +630,7 @@ def _state(thing: Entity, name: str) -> int:
 
 
 def _type(thing: Entity) -> ObjectType:
-    assert thing.type is not None, "internal: only objects are linked"
+    assert thing.type is not None, "internal: only objects have a status"
     return thing.type
 
 
@@ -677,20 +645,17 @@ def tick(to: Expressions) -> None:
 
 
 def _tick(to: Expressions, entity: Entity) -> None:
-    assert entity.type is not None, "internal: only objects have timers"
-    block = to.block
+    block, kind = to.block, _type(entity)
     block.span = entity.span
     timer = to.registers.by_path[f"{label(entity)}.timer"]
-    status = entity_register(entity.number, Field.STATUS)
-    idle = Label()
-    mark = block.taken
-    to.one_of(Op.IF_EQ, status, entity.type.active, idle)
-    count = to.into_temporary(Op.ADD, timer, constant(1))
-    block.emit(Op.MIN, timer, count, constant(entity.timer))
-    with block.when(Op.IF_EQ, timer, constant(entity.timer)):
-        for before, after in sorted(entity.type.expired.items()):
-            with block.when(Op.IF_EQ, status, constant(before), then=idle):
-                block.emit(Op.BECOME, constant(entity.number), constant(after))
-        block.bind(idle)
-        block.emit(Op.LOAD, timer, constant(0))
-    block.release(mark)
+    status, idle = _status(entity), Label()
+    with block.scratch():
+        to.one_of(Op.IF_EQ, status, kind.active, idle)
+        count = to.into_temporary(Op.ADD, timer, constant(1))
+        block.emit(Op.MIN, timer, count, constant(entity.timer))
+        with block.when(Op.IF_EQ, timer, constant(entity.timer)):
+            for before, after in sorted(kind.expired.items()):
+                with block.when(Op.IF_EQ, status, constant(before), then=idle):
+                    block.emit(Op.BECOME, constant(entity.number), constant(after))
+            block.bind(idle)
+            block.emit(Op.LOAD, timer, constant(0))

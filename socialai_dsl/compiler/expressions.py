@@ -41,26 +41,6 @@ from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
 from socialai_dsl.vocabulary import normal, words
 
-_FIELDS = {
-    "x": Field.X,
-    "y": Field.Y,
-    "dir": Field.DIR,
-    "color": Field.COLOR,
-    "status": Field.STATUS,
-    "gone": Field.GONE,
-    "poked": Field.POKED,
-    "pointing": Field.POINTING,
-    "inside": Field.INSIDE,
-    "carrier": Field.CARRIER,
-    "toggled": Field.TOGGLED,
-}
-_WORLD = {
-    "t": Register.T,
-    "width": Register.WIDTH,
-    "height": Register.HEIGHT,
-    "action": Register.ACTION,
-    "noun": Register.NOUN,
-}
 _TESTS = {
     "at": Op.IF_SAME_CELL,
     "next_to": Op.IF_NEXT_TO,
@@ -131,7 +111,8 @@ class Expressions(Emitter):
                 left, right = self._compared(term.left, equality), self._compared(term.right, equality)
                 block.test(_COMPARE[term.op], left, right, otherwise)
             case terms.Test(subject=None):
-                self._about_here(term, otherwise)
+                assert term.name in ("next_to", "at"), f"internal: here.{term.name} is a board of its own"
+                block.test(_TESTS[term.name], self._loop("").cell, self.value(term.object), otherwise)
             case terms.Test():
                 assert term.subject is not None
                 subject = self.value(term.subject)
@@ -181,12 +162,12 @@ class Expressions(Emitter):
 
     def _negated(self, arg: Term, otherwise: Label) -> None:
         if isinstance(arg, terms.Compare) and arg.op in _OPPOSITE:
-            return self.condition(replace(arg, op=_OPPOSITE[arg.op]), otherwise)  # type: ignore[arg-type]
+            self.condition(replace(arg, op=_OPPOSITE[arg.op]), otherwise)  # type: ignore[arg-type]
+            return
         false = Label()
         self.condition(arg, false)
         self.block.skip(otherwise)
         self.block.bind(false)
-        return None
 
     def _said_by(self, term: terms.SaidBy, otherwise: Label) -> None:
         """Whether what an NPC has said in this step is one of its lines that fit."""
@@ -207,11 +188,6 @@ class Expressions(Emitter):
         register = self.registers.by_path[f"{term.member}.frame"]
         numbers = frozenset(i for i, name in enumerate(state_names(frame)) if name == term.state)
         self.one_of(Op.IF_EQ, register, numbers, otherwise)
-
-    def _about_here(self, term: terms.Test, otherwise: Label) -> None:
-        assert term.name in ("next_to", "at"), f"internal: here.{term.name} is a board of its own"
-        here = self._loop("").cell
-        self.block.test(_TESTS[term.name], here, self.value(term.object), otherwise)
 
     def _loop(self, name: str) -> LoopCell:
         """The cell that a variable stands for; `here` has the empty name."""
@@ -256,7 +232,7 @@ class Expressions(Emitter):
             case terms.World(name="noun"):
                 return self._found(self._digit(Register.NOUN, term.digit), term.digit)
             case terms.World():
-                return int(_WORLD[term.name])
+                return int(Register[term.name.upper()])
             case terms.Here():
                 here = self._loop("")
                 return {"x": here.x, "y": here.y, "cell": here.cell}[term.name]
@@ -267,10 +243,9 @@ class Expressions(Emitter):
             case terms.FieldOf(entity=Const(value=entity)) if not (
                 term.name in ("x", "y") and entity in self.leaving
             ):
-                return entity_register(entity, _FIELDS[term.name])
+                return entity_register(entity, Field[term.name.upper()])
             case terms.FieldOf():
-                entity = self.value(term.entity)
-                return self.into_temporary(Op.FIELD, entity, _FIELDS[term.name])
+                return self.into_temporary(Op.FIELD, self.value(term.entity), Field[term.name.upper()])
             case terms.Operation():
                 return self._operation(term)
             case terms.Measure():
@@ -375,7 +350,7 @@ class Expressions(Emitter):
         """The value; where many temporaries are taken, those from `mark` on are given back but for its own."""
         if self.block.taken <= _FEW:
             return value
-        self.block.release(mark)
+        self.block.taken = mark
         if not TEMPORARY + mark <= value < CONSTANT // 2:
             return value
         first = self.block.temporary()
@@ -526,10 +501,8 @@ class Lines:
         noted = to.registers.by_path.get(said_path(speaker))
         if noted is None:
             return
-        mark = block.taken
-        with block.when(Op.IF_EQ, noted, constant(0)):
+        with block.scratch(), block.when(Op.IF_EQ, noted, constant(0)):
             block.emit(Op.LOAD, noted, to.into_temporary(Op.ADD, line, constant(1)))
-        block.release(mark)
 
     def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
         """Emit the number of the line that `speaker` says, in its first tone; the operand it is in."""

@@ -198,14 +198,10 @@ def fold(term: Term, facts: Facts, classes: Classes) -> Term:
         return _truth(any(facts.heard in classes.matching(pattern) for pattern in term.patterns))
     if isinstance(term, terms.World) and term.name == "action" and facts.action is not None:
         return Const(term.type, facts.action)
-    if isinstance(term, terms.PokedNow) and _toggles_nothing(facts) and not may_find_nothing(term.entity):
+    toggles = facts.action in (None, Body.TOGGLE)
+    if isinstance(term, terms.PokedNow) and not toggles and not may_find_nothing(term.entity):
         return FALSE
     return _decide(rebuilt(term, lambda part: fold(part, facts, classes)))
-
-
-def _toggles_nothing(facts: Facts) -> bool:
-    """Whether the agent's action is known to be another one."""
-    return facts.action not in (None, Body.TOGGLE)
 
 
 def fold_whole(term: Term, facts: Facts, classes: Classes) -> Term:
@@ -375,15 +371,21 @@ class ChangeAnalysis:
     def of(self, term: Term) -> When:
         """When the value of a term can change."""
         match term:
-            case Const() | terms.Here() | terms.Variable():
+            case Const() | terms.Here() | terms.Variable() | terms.World(name="width" | "height"):
                 return When.NEVER
-            case terms.World(name="width" | "height"):
-                return When.NEVER
-            case terms.World() | terms.PokedNow() | terms.Said() | terms.Spoke() | terms.Heard():
-                return When.ANY_TIME
-            case terms.SaidBy() | terms.Speaker() | terms.HeardNoun():
-                return When.ANY_TIME
-            case terms.InState() | terms.Chance() | terms.Quantification(op="pick"):
+            case (
+                terms.World()
+                | terms.PokedNow()
+                | terms.Said()
+                | terms.Spoke()
+                | terms.Heard()
+                | terms.SaidBy()
+                | terms.Speaker()
+                | terms.HeardNoun()
+                | terms.InState()
+                | terms.Chance()
+                | terms.Quantification(op="pick")
+            ):
                 return When.ANY_TIME
             case terms.Read():
                 if term.path.startswith("memory.") or term.path in self.written:
@@ -405,11 +407,15 @@ class ChangeAnalysis:
                 return self._items(term)
             case terms.Quantification() if term.to is not None:
                 return max(self._parts(term), self._place(term.to))
-            case terms.Operation() | terms.Compare() | terms.Logic() | terms.Not() | terms.Select():
-                return self._parts(term)
-            case terms.ReadEach():
-                return self._parts(term)
-            case terms.Quantification():
+            case (
+                terms.Operation()
+                | terms.Compare()
+                | terms.Logic()
+                | terms.Not()
+                | terms.Select()
+                | terms.ReadEach()
+                | terms.Quantification()
+            ):
                 return self._parts(term)
             case _:
                 assert_never(term)
@@ -419,12 +425,8 @@ class ChangeAnalysis:
         return max((self.of(part) for part in children(term) if isinstance(part, Term)), default=When.NEVER)
 
     def _items(self, term: terms.Quantification) -> When:
-        conditions = [
-            substitute(term.condition, term.variable, item)
-            for item in term.items
-            if term.condition is not None
-        ]
-        whens = [self.of(condition) for condition in conditions]
+        condition = term.condition or TRUE
+        whens = [self.of(substitute(condition, term.variable, item)) for item in term.items]
         if term.to is not None:
             whens += [self.of(term.to), self._place(term.to), *map(self._place, term.items)]
         return max(whens, default=When.NEVER)
@@ -546,11 +548,3 @@ class Mobility:
             self.walking |= targets
         if effect.name == "move_into":
             self.contents |= targets
-
-
-def leaving(checked: CheckedScenario) -> frozenset[int]:
-    """The entities that leave the room at some time.
-
-    Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
-    """
-    return frozenset(Mobility(checked).vanishing)

@@ -23,26 +23,23 @@ def into_hands(to: Expressions, thing: int, who: int) -> None:
     """A thing leaves the room for the hands of a member of the cast; nothing happens if these are full."""
     block = to.block
     full = Label()
-    mark = block.taken
-    carrier = to.into_temporary(Op.ADD, who, constant(1))
-    for entity in to.checked.entities:
-        if entity.carryable:
-            block.test(Op.IF_NE, entity_register(entity.number, Field.CARRIER), carrier, full)
-    block.emit(Op.VANISH, thing)
-    block.emit(Op.SET_FIELD, thing, Field.CARRIER, carrier)
-    block.bind(full)
-    block.release(mark)
+    with block.scratch():
+        carrier = to.into_temporary(Op.ADD, who, constant(1))
+        for entity in to.checked.entities:
+            if entity.carryable:
+                block.test(Op.IF_NE, entity_register(entity.number, Field.CARRIER), carrier, full)
+        block.emit(Op.VANISH, thing)
+        block.emit(Op.SET_FIELD, thing, Field.CARRIER, carrier)
+        block.bind(full)
 
 
 def back_into_hands(to: Expressions, number: int, carrier: int) -> None:
     """A thing is in nobody's hands any more, or again in those that register `carrier` names, if these are empty."""
     to.block.emit(Op.SET_FIELD, constant(number), Field.CARRIER, constant(0))
-    with to.block.when(Op.IF_NE, carrier, constant(0)):
-        mark = to.block.taken
+    with to.block.when(Op.IF_NE, carrier, constant(0)), to.block.scratch():
         least = to.into_temporary(Op.MIN, carrier, constant(members(to.checked)))
         who = to.into_temporary(Op.SUB, least, constant(1))
         into_hands(to, constant(number), to.into_temporary(Op.MAX, who, constant(0)))
-        to.block.release(mark)
 
 
 def out_of_hands(to: Expressions, term: Term, entity: int) -> None:

@@ -12,11 +12,9 @@ from socialai_dsl.program import (
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
-    MOST_CHOICES,
     TEMPORARIES,
     TEMPORARY,
     Body,
-    EntityColumn,
     Field,
     Flag,
     FrameColumn,
@@ -26,91 +24,17 @@ from socialai_dsl.program import (
     Register,
     room_words,
 )
-from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand, hull
-
-WHOLE_REGISTER: Interval = (-32768, 32767)
-LAST_BODY = Body.STOP_POINTING
-
-
-@dataclass(frozen=True)
-class Ranges:
-    """The range of every register, which each write is proven to keep; the `Bounds` of a program."""
-
-    of_register: tuple[Interval, ...]
-    width: int
-    height: int
-    npcs: int
-    nouns: int
-    first_cell: int = CELL
-
-    @property
-    def last_cell(self) -> int:
-        """The last cell of the canvas as an operand."""
-        return CELL + 32 * (self.height - 1) + self.width - 1
-
-    @classmethod
-    def of(cls, program: Program) -> Ranges:
-        """Ranges that follow from the header, the entities and the names of the program's own registers."""
-        header = program.header
-        ranges = [WHOLE_REGISTER] * header(Header.REGISTERS)
-        width, height = header(Header.CANVAS_WIDTH), header(Header.CANVAS_HEIGHT)
-        least = header(Header.MIN_HEIGHT)
-        ranges[Register.T] = (0, header(Header.HORIZON))
-        ranges[Register.WIDTH] = (header(Header.MIN_WIDTH), width)
-        ranges[Register.HEIGHT] = (least, least + header(Header.HEIGHTS) - 1)
-        ranges[Register.ACTION] = (0, 7)
-        ranges[Register.LAST_TURN] = (-1, LAST_BODY)
-        ranges[Register.CLASS] = (0, header(Header.CLASSES) - 1)
-        ranges[Register.TEMPLATE] = (-1, header(Header.TEMPLATES) - 1)
-        ranges[Register.NOUN] = (-1, header(Header.NOUNS) - 1)
-        ranges[Register.UTTERANCE] = (0, header(Header.TEMPLATES) * header(Header.NOUNS))
-        ranges[Register.CHANGED] = ranges[Register.ACCEPTED] = (0, 1)
-        ranges[Register.POKED] = (-1, header(Header.ENTITIES) - 1)
-        for entity in range(header(Header.ENTITIES)):
-            for which, interval in _field_ranges(program, entity, width, height).items():
-                ranges[FIRST_ENTITY + ENTITY_FIELDS * entity + which] = interval
-        for name in program.registers:
-            ranges[name.register] = (name.low, name.high)
-        return cls(tuple(ranges), width, height, header(Header.NPCS), header(Header.NOUNS))
-
-    def field(self, things: Interval, which: int) -> Interval:
-        """The range of a field over several entities, or over cells."""
-        if things[0] >= self.first_cell - 1:
-            return -1, max(self.width, self.height, 32) - 1
-        first, last = (FIRST_ENTITY + ENTITY_FIELDS * entity + which for entity in things)
-        result = self.of_register[first]
-        for register in range(first, last + 1, ENTITY_FIELDS):
-            result = hull(result, self.of_register[register])
-        return result
-
-    def row(self, first: int, last: int) -> Interval:
-        """The range of all registers from one to another."""
-        result = self.of_register[first]
-        for register in range(first, last + 1):
-            result = hull(result, self.of_register[register])
-        return result
-
-
-def _field_ranges(program: Program, entity: int, width: int, height: int) -> dict[Field, Interval]:
-    return {
-        Field.X: (-1, width - 1),
-        Field.Y: (-1, height - 1),
-        Field.DIR: (0, 3),
-        Field.COLOR: (0, 5),
-        Field.STATUS: (0, greatest_status(program, entity)),
-        Field.GONE: (0, 1),
-        Field.POKED: (0, 1),
-        Field.LAST: (-1, LAST_BODY),
-        Field.POINTING: pointing_range(program, entity),
-        Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
-    }
-
-
-def pointing_range(program: Program, entity: int) -> Interval:
-    """Of an NPC where it points, of an object who carries it."""
-    if program.entities[entity].role == "object":
-        return 0, program.header(Header.NPCS) + 1
-    return 0, CELL + 32 * program.header(Header.CANVAS_HEIGHT) - 1
+from socialai_dsl.program.instructions import (
+    ANYTHING,
+    TABLE,
+    Bounds,
+    Instruction,
+    Interval,
+    Kind,
+    Operand,
+    hull,
+)
+from socialai_dsl.program.program import WHOLE_REGISTER
 
 
 class PathFacts:
@@ -118,7 +42,7 @@ class PathFacts:
     whether the room has its size.
     """
 
-    def __init__(self, ranges: Ranges, has_room: bool) -> None:
+    def __init__(self, ranges: Bounds, has_room: bool) -> None:
         self.ranges = ranges
         self.has_room = has_room
         self.temporaries: dict[int, Interval] = {}
@@ -184,13 +108,6 @@ def inbox_registers(program: Program) -> int:
     return 1 + entry * program.header(Header.INBOX_SIZE)
 
 
-def greatest_status(program: Program, entity: int) -> int:
-    """The last status of an object; the greatest status code of an NPC."""
-    if program.entities[entity].role == "object":
-        return max(1, len(program.entities[entity].states)) - 1
-    return int(program.table(Header.ENTITY_AT)[entity, EntityColumn.KIND])
-
-
 # -- one instruction -----------------------------------------------------------------------------------------
 
 
@@ -211,35 +128,34 @@ def problem_of(
     `is_agents`: it belongs to the frame of the agent, who can do less than NPCs.
     """
     op, *words = instruction
-    entry = TABLE.get(op)  # type: ignore[call-overload]
-    if entry is None:
-        return "the instruction table has no such op"
-    return _Check(entry, words, program, known, writable, is_agents).problem()
+    return _Check(TABLE[Op(op)], words, program, known, writable, is_agents).problem()
 
 
 def written_temporaries(op: int, a: int, b: int, c: int) -> range:
-    """Indices of the temporaries that an instruction writes, should its operands name temporaries."""
-    written = TABLE[Op(op)].written((a, b, c))
+    """Indices of the temporaries that an instruction writes, should its operands name temporaries.
+
+    An op that is in no table is refused when it is reached.
+    """
+    written = TABLE[Op(op)].written((a, b, c)) if op in TABLE else range(0)
     if not TEMPORARY <= written.start < TEMPORARY + TEMPORARIES:
         return range(0)
     return range(written.start - TEMPORARY, written.stop - TEMPORARY)
 
 
+@dataclass
 class _Check:
-    """One instruction where so much is known."""
+    """Whether one instruction is safe, given what is known before it."""
 
-    def __init__(
-        self,
-        entry: Instruction,
-        words: list[int],
-        program: Program,
-        known: PathFacts,
-        writable: frozenset[int],
-        is_agents: bool,
-    ) -> None:
-        self.entry, self.words, self.program, self.known = entry, words, program, known
-        self.writable, self.is_agents = writable, is_agents
-        self.h = program.header
+    entry: Instruction
+    words: list[int]
+    program: Program
+    known: PathFacts
+    writable: frozenset[int]
+    is_agents: bool
+
+    def h(self, word: Header) -> int:
+        """One word of the program's header."""
+        return self.program.header(word)
 
     def problem(self) -> str | None:
         """The problem, or None."""
@@ -260,7 +176,7 @@ class _Check:
         return check(self, operand, word)
 
     def _value(self, operand: Operand, word: int) -> str | None:
-        return self.within(word, operand.low, operand.high)
+        return self.within(word, operand.low, self._greatest(operand))
 
     def within(self, word: int, low: int = ANYTHING[0], high: int = ANYTHING[1]) -> str | None:
         """Whether a value can be read and is in a range."""
@@ -312,7 +228,22 @@ class _Check:
         return self.literal(word, 0, self.h(Header.REGISTERS) - 1)
 
     def _literal(self, operand: Operand, word: int) -> str | None:
-        return self.literal(word, operand.low, operand.high)
+        return self.literal(word, operand.low, self._greatest(operand))
+
+    def _greatest(self, operand: Operand) -> int:
+        """The greatest number that an operand may be: of what the program lists, the last."""
+        match operand.meaning:
+            case "frame":
+                return self.h(Header.FRAMES) - 1
+            case "line":
+                return self.h(Header.LINES) - 1
+            case "outcome":
+                return len(self.program.outcome_table) - 3
+            case "rule":
+                return len(self.program.rules) - 1
+            case "utterance class":
+                return self.h(Header.CLASSES) - 1
+        return operand.high
 
     @staticmethod
     def literal(value: int, low: int, high: int) -> str | None:
@@ -350,9 +281,6 @@ class _Check:
 
     # --- what single instructions ask besides ---
 
-    def _field(self) -> str | None:
-        return self.literal(self.words[2], 0, ENTITY_FIELDS - 1)
-
     def _nearest(self) -> str | None:
         first, last = self.words[2] >> 8, self.words[2] & 255
         return self.literal(last, 0, self.h(Header.ENTITIES) - 1) or self.literal(first, 0, last)
@@ -360,16 +288,10 @@ class _Check:
     def _draw_other(self) -> str | None:
         return self.literal(self.words[2] >> 24, 2, 127)
 
-    def _not_negative(self) -> str | None:
-        return self.within(self.words[1], 0)
-
     def _heard(self) -> str | None:
         if not self.h(Header.FLAGS) & Flag.HEARD_BY:
             return "nobody notes who said what"
         return self.literal(self.words[2], 0, self.h(Header.CLASS_SETS) - 1)
-
-    def _if_heard(self) -> str | None:
-        return self.literal(self.words[1], 1, self.h(Header.CLASSES) - 1)
 
     def _store_at(self) -> str | None:
         if problem := self._row():
@@ -406,29 +328,18 @@ class _Check:
         statuses = min(max(1, len(self.program.entities[entity].states)) for entity in range(first, last + 1))
         return self.within(self.words[1], 0, statuses - 1)
 
-    def _line(self) -> str | None:
-        return self.within(self.words[1], 0, self.h(Header.LINES) - 1)
-
     def _goto(self) -> str | None:
         return self._state(self.words[0], self.words[1])
 
     def _state(self, frame: int, state: int) -> str | None:
-        if problem := self.literal(frame, 0, self.h(Header.FRAMES) - 1):
-            return problem
         states = int(self.program.table(Header.FRAME_AT)[frame, FrameColumn.STATES])
         return self.literal(state, 0, states - 1)
 
-    def _count(self) -> str | None:
-        return self.literal(self.words[0], 0, len(self.program.rules) - 1)
-
     def _answer(self) -> str | None:
-        goal = self.words[2]
-        return (
-            self._count() or self._line() or (self._state(goal >> 8, (goal & 255) - 1) if goal != 0 else None)
-        )
-
-    def _outcome(self) -> str | None:
-        return self.literal(self.words[0], 0, len(self.program.outcome_table) - 3)
+        frame, state = self.words[2] >> 8, (self.words[2] & 255) - 1
+        if not self.words[2]:
+            return None
+        return self.literal(frame, 0, self.h(Header.FRAMES) - 1) or self._state(frame, state)
 
     def _body(self) -> str | None:
         stop = (Body.STOP_POINTING, Body.STOP_POINTING)
@@ -438,11 +349,6 @@ class _Check:
 
     def _choose(self) -> str | None:
         actions, count, _ = self.words
-        problem = self.literal(count, 1, MOST_CHOICES) or self.literal(
-            actions, 0, (1 << 4 * MOST_CHOICES) - 1
-        )
-        if problem:
-            return problem
         if any(actions >> 4 * k & 15 > Body.NONE for k in range(count)):
             return f"{actions} holds what is no action"
         return None
@@ -450,11 +356,9 @@ class _Check:
     def _point(self) -> str | None:
         if self.is_agents:
             return "the agent cannot point"
-        where, bounds = self.words[1], self.known.ranges
-        if self.interval(where)[0] < bounds.first_cell - 1:
-            problem = self.within(where, 0, 3)
-        else:
-            problem = self.within(where, bounds.first_cell - 1, bounds.last_cell)
+        where, none = self.words[1], CELL - 1
+        is_cell = self.interval(where)[0] >= none
+        problem = self.within(where, *((none, self.known.ranges.last_cell) if is_cell else (0, 3)))
         return problem or self.within(self.words[0], 1, self.h(Header.NPCS))
 
     def _put(self) -> str | None:
@@ -496,24 +400,16 @@ _KINDS: Final[dict[Kind, Callable[[_Check, Operand, int], str | None]]] = {
 }
 
 _OWN_CHECKS: Final[dict[Op, Callable[[_Check], str | None]]] = {
-    Op.IF_HEARD: _Check._if_heard,
-    Op.FIELD: _Check._field,
     Op.NEAREST: _Check._nearest,
     Op.DRAW_OTHER: _Check._draw_other,
-    Op.LOWEST_BIT: _Check._not_negative,
-    Op.PICK_BIT: _Check._not_negative,
     Op.HEARD_FROM: _Check._heard,
     Op.HEARD_NOUN: _Check._heard,
     Op.READ_AT: _Check._row,
     Op.STORE_AT: _Check._store_at,
     Op.SET_FIELD: _Check._set_field,
     Op.BECOME: _Check._become,
-    Op.SAY: _Check._line,
     Op.GOTO: _Check._goto,
-    Op.COUNT: _Check._count,
     Op.ANSWER: _Check._answer,
-    Op.END: _Check._outcome,
-    Op.END_GRADED: _Check._outcome,
     Op.BODY: _Check._body,
     Op.CHOOSE: _Check._choose,
     Op.POINT: _Check._point,

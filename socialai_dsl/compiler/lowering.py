@@ -210,7 +210,10 @@ class _FrameCompiler:
         self.shared, self.number, self.frame = shared, number, frame
         self.states = state_names(frame)
         self.clock = shared.registers.by_path[f"{frame.member}.clock"]
-        self.counters = {name: self._counter(name) for name in self._names()}
+        self.counters: dict[str, int] = {}
+        for counted in frame.steps or frame.rules:
+            self.counters[counted.name] = len(shared.rules)
+            shared.rules.append(counted.name)
         self.once = {
             rule.name: shared.registers.add(f"{frame.member}.fired.{rule.name}", BOOL)
             for rule in frame.rules
@@ -237,16 +240,10 @@ class _FrameCompiler:
             return Type("int", NOTHING, FULFILLED if activity.name in OF_HANDS else ACTING)
         return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
-    def _names(self) -> list[str]:
-        return [one.name for one in self.frame.steps or self.frame.rules]
-
-    def _counter(self, name: str) -> int:
-        self.shared.rules.append(name)
-        return len(self.shared.rules) - 1
-
     def rows(self) -> list[list[int]]:
         if self.frame.steps:
-            return [self._step_row(k) for k in range(len(self.frame.steps))] + [self._idle_row()]
+            idle = [0] * (1 + 2 * (self.shared.classes.count + 1))
+            return [*(self._step_row(k) for k in range(len(self.frame.steps))), idle]
         return [self._state_row(k) for k in range(len(self.frame.states))]
 
     def perceive(self) -> int:
@@ -261,13 +258,12 @@ class _FrameCompiler:
         """The address of what rules of `first` do after the body action that they have chosen."""
         to = self._expressions(Facts())
         for rule in self.later.rules:
-            mark = to.block.taken
-            to.block.span = rule.span
-            with to.block.when(Op.IF_EQ, *self.later.is_pending(rule)):
-                self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+            with to.block.scratch():
                 to.block.span = rule.span
-                self._go(to, rule, follow=False)
-            to.block.release(mark)
+                with to.block.when(Op.IF_EQ, *self.later.is_pending(rule)):
+                    self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+                    to.block.span = rule.span
+                    self._go(to, rule, follow=False)
         if self.later.rules:
             to.block.halt()  # where none of them is pending
         return self.shared.code.add(to.block, f"{self.frame.member}.{self.frame.frame}.deferred")
@@ -322,9 +318,6 @@ class _FrameCompiler:
         shared = self.shared
         return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, aim)
 
-    def _idle_row(self) -> list[int]:
-        return [0] * (1 + 2 * (self.shared.classes.count + 1))
-
     def _effects(self, to: Expressions) -> Effects:
         return Effects(to, self.shared.lines, self.shared.homes, self.shared.computed.read)
 
@@ -369,28 +362,27 @@ class _FrameCompiler:
     def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
         block = to.block
         following = Label()
-        mark = block.taken
-        asked = self._asked(to, rule)
-        self._conditions(to, rule, asked, following)
-        operands = self._effects(to).compute(rule, asked.nothing("values", following), self.speaker)
-        start = len(block.instructions)
-        block.emit(Op.COUNT, self.counters[rule.name])
-        if rule.do is None:
-            self._effects(to).carry_out(rule, operands, self.speaker)
-        elif rule in self.later.rules:
-            self.later.note(to, rule, operands)
-        if rule.once:
-            block.emit(Op.LOAD, self.once[rule.name], constant(1))
-        block.span = rule.span
-        if rule.do is None:
-            self._go(to, rule, follow)
-            block.fuse_answer(start)
-        else:
-            self._activities(to).emit(rule.do)
-            block.halt()
-        asked.report(to, following)
-        block.bind(following)
-        block.release(mark)
+        with block.scratch():
+            asked = self._asked(to, rule)
+            self._conditions(to, rule, asked, following)
+            operands = self._effects(to).compute(rule, asked.nothing("values", following), self.speaker)
+            start = len(block.instructions)
+            block.emit(Op.COUNT, self.counters[rule.name])
+            if rule.do is None:
+                self._effects(to).carry_out(rule, operands, self.speaker)
+            elif rule in self.later.rules:
+                self.later.note(to, rule, operands)
+            if rule.once:
+                block.emit(Op.LOAD, self.once[rule.name], constant(1))
+            block.span = rule.span
+            if rule.do is None:
+                self._go(to, rule, follow)
+                block.fuse_answer(start)
+            else:
+                self._activities(to).emit(rule.do)
+                block.halt()
+            asked.report(to, following)
+            block.bind(following)
 
     def _go(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
         """Enter the next state; after goto_now in `then`, look at the new state's `then` at once."""
@@ -507,11 +499,9 @@ class _FrameCompiler:
     def _count_round(self, to: Expressions, nested: NestedSteps, last: Label) -> None:
         block, register = to.block, self.rounds[nested.register]
         block.test(Op.IF_LT, register, constant(nested.rounds - 1), last)
-        mark = block.taken
-        block.emit(
-            Op.MIN, register, to.into_temporary(Op.ADD, register, constant(1)), constant(nested.rounds - 1)
-        )
-        block.release(mark)
+        with block.scratch():
+            more = to.into_temporary(Op.ADD, register, constant(1))
+            block.emit(Op.MIN, register, more, constant(nested.rounds - 1))
 
     def _take_or_leave(self, to: Expressions, entry: int) -> bool:
         """As `_take`, of an entry that begins unless it is left out."""
@@ -526,7 +516,11 @@ class _FrameCompiler:
     def _take(self, to: Expressions, entry: int, *, begins: bool) -> bool:
         """Take this turn in an entry, which begins or goes on, unless it is fulfilled; whether it may be."""
         block, step = to.block, self.frame.steps[entry]
-        activities = self._noting_of_agent(to, entry)
+        aim = self.aims.get(entry) if self._is_agents else None
+        activities = self._activities(to, aim)
+        if aim is not None:
+            # A player in the script's place need not do what the entry says, so notes are taken before it acts.
+            activities.emit(step.activity, acting=False)
         if not self._skippable(step):
             self._stay_in(to, entry if begins else None)
             return False
@@ -537,14 +531,6 @@ class _FrameCompiler:
         self._stay_in(to, entry if begins else None)
         block.bind(leave)
         return True
-
-    def _noting_of_agent(self, to: Expressions, entry: int) -> Activities:
-        """A player in the script's place need not do what the entry says, so its notes are taken before it acts."""
-        aim = self.aims.get(entry) if self._is_agents else None
-        activities = self._activities(to, aim)
-        if aim is not None:
-            activities.note(self.frame.steps[entry].activity)
-        return activities
 
     def _stay_in(self, to: Expressions, entry: int | None) -> None:
         """Take this turn in an entry that begins; None: in the one that goes on."""
@@ -565,12 +551,15 @@ class _FrameCompiler:
         block.span = step.span
         asked = self._asked(to, step)
         if step.duration is not None and step.duration > 0:
-            unless = asked.unless("for", running) if step.until is None else None
-            self._after(step.duration, to, ended, unless)
+            not_yet = Label()
+            still = asked.unless("for", running) if step.until is None else not_yet
+            block.test(Op.IF_LE, constant(step.duration), self.clock, still)
+            block.skip(ended)
+            block.bind(not_yet)
         if step.lasted is not None:
             not_yet = Label()
-            last = step.until is None
-            to.sited_condition(step.lasted, asked.unless("for", running) if last else not_yet)
+            still = asked.unless("for", running) if step.until is None else not_yet
+            to.sited_condition(step.lasted, still)
             block.skip(ended)
             block.bind(not_yet)
         if step.until is not None:
@@ -616,13 +605,6 @@ class _FrameCompiler:
                 block.bind(last)
                 block.emit(Op.LOAD, self.rounds[level.nested.register], constant(0))
 
-    def _after(self, duration: int, to: Expressions, ended: Label, running: Label | None) -> None:
-        """Skip to `ended` once the entry has lasted long enough, else to `running` (None: fall through)."""
-        not_yet = Label()
-        to.block.test(Op.IF_LE, constant(duration), self.clock, running or not_yet)
-        to.block.skip(ended)
-        to.block.bind(not_yet)
-
 
 # -- rules of the world: once a step, after all turns, each that holds fires ---------------------------------
 
@@ -648,16 +630,17 @@ def _world_rule(to: Expressions, allocation: Allocation, rule: RulePlan, asked: 
     assert rule.do is None, "internal: the world has no body"
     block = to.block
     following = Label()
-    mark = block.taken
-    fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
-    _conditions(to, rule, asked, following, fired)
-    effects = Effects(to, allocation.lines, allocation.homes, allocation.computed.read)
-    effects.emit(rule, len(allocation.rules) - 1, asked.nothing("values", following))
-    if fired is not None:
-        block.emit(Op.LOAD, fired, constant(1))
-    asked.report(to, following)
-    block.bind(following)
-    block.release(mark)
+    with block.scratch():
+        fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
+        _conditions(to, rule, asked, following, fired)
+        effects = Effects(to, allocation.lines, allocation.homes, allocation.computed.read)
+        operands = effects.compute(rule, asked.nothing("values", following), None)
+        block.emit(Op.COUNT, len(allocation.rules) - 1)
+        effects.carry_out(rule, operands, None)
+        if fired is not None:
+            block.emit(Op.LOAD, fired, constant(1))
+        asked.report(to, following)
+        block.bind(following)
 
 
 # -- outcomes: one block for each pair of utterance class and body action, most of them empty ----------------
@@ -693,11 +676,10 @@ def _first_that_holds(to: Expressions, checked: CheckedScenario, notes: NoteTake
         asked = notes.outcome(to, number, outcome)
         asked.condition(to, "outcome", outcome.condition, following)
         if outcome.graded is not None and outcome.success:
-            mark = block.taken
-            to.failed = asked.nothing("values", following)
-            block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
-            to.failed = None
-            block.release(mark)
+            with block.scratch():
+                to.failed = asked.nothing("values", following)
+                block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
+                to.failed = None
         else:
             block.emit(Op.END, number, outcome.percent if outcome.success else 0)
         block.halt()

@@ -107,7 +107,7 @@ class Recorder(NoteTaker):
             self.outcomes[number] = Note(self.register(), plan)
         return _Noting(self, self.outcomes[number], {})
 
-    def register(self, type_: Type | None = None) -> int:
+    def register(self) -> int:
         """A fresh register."""
         self.next += 1
         number = self.next - 1
@@ -197,9 +197,8 @@ class _Noting(RuleConditions):
             shown = self._aside.get("hears", []) if hears else shown
             number = self._number("hears" if hears else key, words, shown)
             to.failed = self._pad(-number)
-            mark = to.block.taken
-            to.condition(fold(term, to.facts, to.classes), self._pad(number, shown))
-            to.block.release(mark)
+            with to.block.scratch():
+                to.condition(fold(term, to.facts, to.classes), self._pad(number, shown))
         to.failed = failed
 
     def report(self, to: Expressions, otherwise: Label) -> None:
@@ -211,10 +210,9 @@ class _Noting(RuleConditions):
             block.bind(pad.label)
             block.emit(Op.LOAD, self._note.register, constant(pad.number))
             for value, shown in zip(self._note.parts[abs(pad.number) - 1].values, pad.shown, strict=False):
-                mark = block.taken
-                least = to.into_temporary(Op.MAX, shown.emit(to), constant(_LEAST))
-                block.emit(Op.MIN, value.name.register, least, constant(_GREATEST))
-                block.release(mark)
+                with block.scratch():
+                    least = to.into_temporary(Op.MAX, shown.emit(to), constant(_LEAST))
+                    block.emit(Op.MIN, value.name.register, least, constant(_GREATEST))
             block.skip(otherwise)
 
     def _pad(self, number: int, shown: Sequence[_Shown] = ()) -> Label:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.assembler import Label, Registers, constant, store
+from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
@@ -72,8 +72,8 @@ def _asked(plan: ProbePlan) -> str:
 
 
 def _ask(to: Expressions, plan: ProbePlan) -> None:
-    block, registers = to.block, to.registers
-    asked = registers.add(_asked(plan), BOOL, fleeting=True)
+    block = to.block
+    asked = to.registers.add(_asked(plan), BOOL, fleeting=True)
     not_now = Label()
     block.span = plan.span
     block.emit(Op.LOAD, asked, constant(0))
@@ -81,20 +81,19 @@ def _ask(to: Expressions, plan: ProbePlan) -> None:
         to.sited_condition(plan.when, not_now)
     texts = (plan.ask, (plan.answer,), *plan.answers)
     for value in (piece for text in texts for piece in text if isinstance(piece, Drawn)):
-        _note(to, registers, value, not_now)
+        _note(to, value, not_now)
     block.emit(Op.LOAD, asked, constant(1))
     block.bind(not_now)
 
 
-def _note(to: Expressions, registers: Registers, value: Drawn, nothing: Label) -> None:
+def _note(to: Expressions, value: Drawn, nothing: Label) -> None:
     """Put a value into a register of its own; a condition that finds nothing is false, any other value skips."""
     block = to.block
-    register = registers.add(value.path, value.type, fleeting=True)
-    mark = block.taken
-    if value.type.kind == "bool":
-        to.note_whether(register, value.value)
-    else:
-        to.failed = nothing
-        store(registers, block.emit, value.path, to.sited_copy(value.value))
-        to.failed = None
-    block.release(mark)
+    register = to.registers.add(value.path, value.type, fleeting=True)
+    with block.scratch():
+        if value.type.kind == "bool":
+            to.note_whether(register, value.value)
+        else:
+            to.failed = nothing
+            to.store(value.path, to.sited_copy(value.value))
+            to.failed = None

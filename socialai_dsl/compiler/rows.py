@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, Registers, constant
-from socialai_dsl.compiler.cells import Emitter
+from socialai_dsl.compiler.cells import Emitter, in_a_row
 from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Term
@@ -14,7 +14,7 @@ def row_of(registers: Registers, term: terms.ReadEach) -> tuple[int, int, int]:
     number to be added to it. That is the key itself, or the place of the key among all.
     """
     first, keys = registers.by_path[term.registers[0].path], term.keys
-    if _in_a_row(keys) and 0 <= keys[0] <= first:
+    if in_a_row(keys) and 0 <= keys[0] <= first:
         return first - keys[0], keys[0], keys[-1]
     return first, 0, len(keys) - 1
 
@@ -35,10 +35,6 @@ def _is_within_its_type(term: Term) -> bool:
     return False
 
 
-def _in_a_row(keys: tuple[int, ...]) -> bool:
-    return keys == tuple(range(keys[0], keys[0] + len(keys)))
-
-
 def row(to: Emitter, term: terms.ReadEach) -> tuple[int, int]:
     """A register, and an operand to be added to its number, for that of a key; see `row_of`.
 
@@ -47,7 +43,7 @@ def row(to: Emitter, term: terms.ReadEach) -> tuple[int, int]:
     first, low, _ = row_of(to.registers, term)
     key = to.value(term.key)
     fails = to.failed if term.may_miss else None
-    if not _in_a_row(term.keys) or (term.may_miss and fails is None):
+    if not in_a_row(term.keys) or (term.may_miss and fails is None):
         place = _place_among(to, term.keys, key, fails)
         return first, place if low == 0 else to.into_temporary(Op.ADD, place, constant(low))
     if fails is not None:

@@ -35,198 +35,197 @@ from socialai_dsl.semantics.plans import (
 from socialai_dsl.semantics.terms import Term
 from socialai_dsl.vocabulary import COLORS
 
-_SIDES = {"top": Side.TOP, "bottom": Side.BOTTOM, "left": Side.LEFT, "right": Side.RIGHT}
+# -- placements: a set of cells, one of them drawn --------------------------------------------------------------
 
 
-class Places:
-    """Emits placements through `to`; boards are taken and given back like a stack."""
-
-    def __init__(self, to: Expressions) -> None:
-        self.to = to
-
-    def put(self, placing: Placing) -> None:
-        """Emit the draw of a cell and the putting of the entity there, or that it lies in something."""
-        to, block = self.to, self.to.block
-        block.span = placing.span
-        mark = block.taken
-        if placing.inside is not None:
-            to.site = placing.where_site
-            put_in = self._in_hands if placing.in_hands else self._inside
-            put_in(placing.entity, placing.inside)
-            block.release(mark)
-            return
-        cell = block.temporary(2)
-        if placing.at is not None:
-            to.site = placing.where_site
-            for i, coordinate in enumerate(placing.at):
-                self._coordinate(cell + i, coordinate, to.checked.room.canvas[i])
-        elif placing.nowhere:
-            for target in (cell, cell + 1):
-                block.emit(Op.LOAD, target, constant(-1))
-        else:
-            to.site = placing.where_site
-            boards = block.boards_taken
-            board = self._union(placing.regions, placing.overlap)
-            if not placing.overlap:
-                block.emit(Op.B_FREE, board)
-            if placing.where is not None:
-                self._keep(board, placing.where)
-            block.emit(Op.PICK_CELL, cell, board, to.sites.row(placing.site, placing.number))
-            block.release_boards(boards)
-        block.emit(Op.PUT, constant(placing.entity), cell)
-        block.release(mark)
-
-    def _inside(self, content: int, holder: Term) -> None:
-        """On the cell of what it lies in, but not in the room."""
-        block = self.to.block
-        cell = block.temporary(2)
-        number = self.to.value(holder)
-        block.emit(Op.FIELD, cell, number, Field.X)
-        block.emit(Op.FIELD, cell + 1, number, Field.Y)
-        block.emit(Op.PUT, constant(content), cell)
-        block.emit(Op.VANISH, constant(content))
-        block.emit(Op.SET_FIELD, constant(content), Field.INSIDE, number)
-
-    def _in_hands(self, content: int, carrier: Term) -> None:
-        """Not in the room, and carried, unless these hands are full already."""
-        block = self.to.block
-        nowhere = block.temporary(2)
-        for target in (nowhere, nowhere + 1):
+def _put(to: Expressions, placing: Placing) -> None:
+    """The draw of a cell and the putting of the entity there, or that it lies in something."""
+    block = to.block
+    block.span, to.site = placing.span, placing.where_site
+    if placing.inside is not None:
+        put_in = _in_hands if placing.in_hands else _inside
+        put_in(to, placing.entity, placing.inside)
+        return
+    cell = block.temporary(2)
+    if placing.at is not None:
+        for i, coordinate in enumerate(placing.at):
+            _coordinate(to, cell + i, coordinate, to.checked.room.canvas[i])
+    elif placing.nowhere:
+        for target in (cell, cell + 1):
             block.emit(Op.LOAD, target, constant(-1))
-        block.emit(Op.PUT, constant(content), nowhere)
-        into_hands(self.to, constant(content), self.to.value(carrier))
+    else:
+        boards = block.boards_taken
+        board = _union(to, placing.regions, placing.overlap)
+        if not placing.overlap:
+            block.emit(Op.B_FREE, board)
+        if placing.where is not None:
+            _keep(to, board, placing.where)
+        block.emit(Op.PICK_CELL, cell, board, to.sites.row(placing.site, placing.number))
+        block.release_boards(boards)
+    block.emit(Op.PUT, constant(placing.entity), cell)
 
-    def _coordinate(self, target: int, coordinate: Term, size: int) -> None:
-        """A coordinate, kept on the canvas where it comes from something that may be anywhere."""
-        block = self.to.block
-        block.emit(Op.LOAD, target, self.to.value(coordinate))
-        somewhere = any(
-            mentions(coordinate, kind) for kind in (terms.FieldOf, terms.Measure, terms.Quantification)
-        )
-        if somewhere or coordinate.type.low < -1 or coordinate.type.high >= size:
-            block.emit(Op.MAX, target, target, constant(-1))
-            block.emit(Op.MIN, target, target, constant(size - 1))
 
-    def _union(self, regions: tuple[Region, ...], overlap: bool) -> int:
-        board = self._region(regions[0], overlap)
-        for region in regions[1:]:
-            self.to.block.emit(Op.B_OR, board, self._region(region, overlap))
-            self.to.block.release_boards(board + 1)
-        return board
+def _inside(to: Expressions, content: int, holder: Term) -> None:
+    """On the cell of what it lies in, but not in the room."""
+    block = to.block
+    cell = block.temporary(2)
+    number = to.value(holder)
+    block.emit(Op.FIELD, cell, number, Field.X)
+    block.emit(Op.FIELD, cell + 1, number, Field.Y)
+    block.emit(Op.PUT, constant(content), cell)
+    block.emit(Op.VANISH, constant(content))
+    block.emit(Op.SET_FIELD, constant(content), Field.INSIDE, number)
 
-    def _region(self, region: Region, overlap: bool) -> int:
-        block = self.to.block
-        board = block.board()
-        match region.name:
-            case "anywhere":
-                block.emit(Op.B_FLOOR, board)
-            case "wall":
-                self._wall(board, region)
-            case "next_to":
-                block.emit(Op.B_NEXT_TO, board, self.to.value(region.args[0]))
-                self._only_floor(board)
-            case "in_front_of":
-                block.emit(Op.B_IN_FRONT_OF, board, self.to.value(region.args[0]))
-                self._only_floor(board)
-            case _:
-                self._rectangle(board, region, overlap and region.name in EXACT)
-        return board
 
-    def _wall(self, board: int, region: Region) -> None:
-        """One side of the room, known or drawn (then `region.args` holds it as a number, like Side)."""
-        block = self.to.block
-        if region.side is not None:
-            block.emit(Op.B_WALL, board, _SIDES[region.side], region.margin)
-            return
-        drawn = self.to.value(region.args[0])
-        done = Label()
-        *others, last = Side
-        for side in others:
-            with block.when(Op.IF_EQ, drawn, constant(side), then=done):
-                block.emit(Op.B_WALL, board, side, region.margin)
-        block.emit(Op.B_WALL, board, last, region.margin)
-        block.bind(done)
+def _in_hands(to: Expressions, content: int, carrier: Term) -> None:
+    """Not in the room, and carried, unless these hands are full already."""
+    block = to.block
+    nowhere = block.temporary(2)
+    for target in (nowhere, nowhere + 1):
+        block.emit(Op.LOAD, target, constant(-1))
+    block.emit(Op.PUT, constant(content), nowhere)
+    into_hands(to, constant(content), to.value(carrier))
 
-    def _only_floor(self, board: int) -> None:
-        floor = self.to.block.board()
-        self.to.block.emit(Op.B_FLOOR, floor)
-        self.to.block.emit(Op.B_AND, board, floor)
-        self.to.block.release_boards(floor)
 
-    def _rectangle(self, board: int, region: Region, built: bool) -> None:
-        """Halves, rows, columns and rectangles; with `built` also where something is built."""
-        block = self.to.block
-        mark = block.taken
+def _coordinate(to: Expressions, target: int, coordinate: Term, size: int) -> None:
+    """A coordinate, kept on the canvas where it comes from something that may be anywhere."""
+    block = to.block
+    block.emit(Op.LOAD, target, to.value(coordinate))
+    somewhere = any(
+        mentions(coordinate, kind) for kind in (terms.FieldOf, terms.Measure, terms.Quantification)
+    )
+    if somewhere or coordinate.type.low < -1 or coordinate.type.high >= size:
+        block.emit(Op.MAX, target, target, constant(-1))
+        block.emit(Op.MIN, target, target, constant(size - 1))
+
+
+def _union(to: Expressions, regions: tuple[Region, ...], overlap: bool) -> int:
+    board = _region(to, regions[0], overlap)
+    for region in regions[1:]:
+        to.block.emit(Op.B_OR, board, _region(to, region, overlap))
+        to.block.release_boards(board + 1)
+    return board
+
+
+def _region(to: Expressions, region: Region, overlap: bool) -> int:
+    block = to.block
+    board = block.board()
+    match region.name:
+        case "anywhere":
+            block.emit(Op.B_FLOOR, board)
+        case "wall":
+            _wall(to, board, region)
+        case "next_to":
+            block.emit(Op.B_NEXT_TO, board, to.value(region.args[0]))
+            _only_floor(to, board)
+        case "in_front_of":
+            block.emit(Op.B_IN_FRONT_OF, board, to.value(region.args[0]))
+            _only_floor(to, board)
+        case _:
+            _rectangle(to, board, region, overlap and region.name in EXACT)
+    return board
+
+
+def _wall(to: Expressions, board: int, region: Region) -> None:
+    """One side of the room, known or drawn (then `region.args` holds it as a number, like Side)."""
+    block = to.block
+    if region.side is not None:
+        block.emit(Op.B_WALL, board, Side[region.side.upper()], region.margin)
+        return
+    drawn = to.value(region.args[0])
+    done = Label()
+    *others, last = Side
+    for side in others:
+        with block.when(Op.IF_EQ, drawn, constant(side), then=done):
+            block.emit(Op.B_WALL, board, side, region.margin)
+    block.emit(Op.B_WALL, board, last, region.margin)
+    block.bind(done)
+
+
+def _only_floor(to: Expressions, board: int) -> None:
+    floor = to.block.board()
+    to.block.emit(Op.B_FLOOR, floor)
+    to.block.emit(Op.B_AND, board, floor)
+    to.block.release_boards(floor)
+
+
+def _rectangle(to: Expressions, board: int, region: Region, built: bool) -> None:
+    """Halves, rows, columns and rectangles; with `built` also where something is built."""
+    block = to.block
+    with block.scratch():
         bounds = list(EVERYWHERE)
         if region.name in ("column", "row"):
             at = 0 if region.name == "column" else 2
-            bounds[at] = bounds[at + 1] = self.to.value(region.args[0])
+            bounds[at] = bounds[at + 1] = to.value(region.args[0])
         elif region.name == "rect":
-            x0, y0, x1, y1 = (self.to.value(arg) for arg in region.args)
+            x0, y0, x1, y1 = (to.value(arg) for arg in region.args)
             bounds = [x0, x1, y0, y1]
         else:
-            self._half(region.name, bounds)
+            _half(to, region.name, bounds)
         fill_rectangle(block, board, bounds, Counting.BUILT if built else Counting.FLOOR)
-        block.release(mark)
 
-    def _half(self, name: str, bounds: list[int]) -> None:
-        """left_half is x < W // 2, right_half x > W // 2; top and bottom likewise: the middle line is in neither."""
-        block = self.to.block
-        middle, beyond = block.temporary(), block.temporary()
-        size = Register.WIDTH if name in ("left_half", "right_half") else Register.HEIGHT
-        block.emit(Op.DIV, middle, size, constant(2))
-        lower = name in ("left_half", "top_half")
-        block.emit(Op.SUB if lower else Op.ADD, beyond, middle, constant(1))
-        bounds[(0 if size == Register.WIDTH else 2) + (1 if lower else 0)] = beyond
 
-    # --- where ---
+def _half(to: Expressions, name: str, bounds: list[int]) -> None:
+    """left_half is x < W // 2, right_half x > W // 2; top and bottom likewise: the middle line is in neither."""
+    block = to.block
+    middle, beyond = block.temporary(), block.temporary()
+    size = Register.WIDTH if name in ("left_half", "right_half") else Register.HEIGHT
+    block.emit(Op.DIV, middle, size, constant(2))
+    lower = name in ("left_half", "top_half")
+    block.emit(Op.SUB if lower else Op.ADD, beyond, middle, constant(1))
+    bounds[(0 if size == Register.WIDTH else 2) + (1 if lower else 0)] = beyond
 
-    def _keep(self, board: int, where: Term) -> None:
-        """Take out of `board` the cells for which `where` is false."""
-        for part in conjuncts(self.to, where):
-            if not is_about_cell(part):
-                self._keep_all(board, part)
-            elif not keep_shape(self.to, board, part):
-                self._keep_other(board, part)
 
-    def _keep_other(self, board: int, where: Term) -> None:
-        match where:
-            case terms.Not():
-                held = self._copy(board)
-                self._keep(held, where.arg)
-                self.to.block.emit(Op.B_WITHOUT, board, held)
-                self.to.block.release_boards(held)
-            case terms.Logic():
-                self._keep_either(board, where.args)
-            case terms.Quantification(op="any", cells=False):
-                self._keep_either(board, tuple(self.to.instance(where, item) for item in where.items))
-            case _:
-                keep_each(self.to, board, where)
+def _keep(to: Expressions, board: int, where: Term) -> None:
+    """Take out of `board` the cells for which `where` is false."""
+    for part in conjuncts(to, where):
+        if not is_about_cell(part):
+            _keep_all(to, board, part)
+        elif not keep_shape(to, board, part):
+            _keep_other(to, board, part)
 
-    def _keep_all(self, board: int, condition: Term) -> None:
-        """Take out every cell if the condition, which is the same for all, is false."""
-        block = self.to.block
-        drop, done = Label(), Label()
-        self.to.condition(condition, drop)
-        block.skip(done)
-        block.bind(drop)
-        block.emit(Op.B_WITHOUT, board, board)
-        block.bind(done)
 
-    def _copy(self, board: int) -> int:
-        copy = self.to.block.board()
-        self.to.block.emit(Op.B_COPY, copy, board)
-        return copy
+def _keep_other(to: Expressions, board: int, where: Term) -> None:
+    match where:
+        case terms.Not():
+            held = _copy(to, board)
+            _keep(to, held, where.arg)
+            to.block.emit(Op.B_WITHOUT, board, held)
+            to.block.release_boards(held)
+        case terms.Logic():
+            _keep_either(to, board, where.args)
+        case terms.Quantification(op="any", cells=False):
+            _keep_either(to, board, tuple(to.instance(where, item) for item in where.items))
+        case _:
+            keep_each(to, board, where)
 
-    def _keep_either(self, board: int, args: tuple[Term, ...]) -> None:
-        rest = self._copy(board)
-        for arg in args:
-            held = self._copy(rest)
-            self._keep(held, arg)
-            self.to.block.emit(Op.B_WITHOUT, rest, held)
-            self.to.block.release_boards(held)
-        self.to.block.emit(Op.B_WITHOUT, board, rest)
-        self.to.block.release_boards(rest)
+
+def _keep_all(to: Expressions, board: int, condition: Term) -> None:
+    """Take out every cell if the condition, which is the same for all, is false."""
+    block = to.block
+    drop, done = Label(), Label()
+    to.condition(condition, drop)
+    block.skip(done)
+    block.bind(drop)
+    block.emit(Op.B_WITHOUT, board, board)
+    block.bind(done)
+
+
+def _copy(to: Expressions, board: int) -> int:
+    copy = to.block.board()
+    to.block.emit(Op.B_COPY, copy, board)
+    return copy
+
+
+def _keep_either(to: Expressions, board: int, args: tuple[Term, ...]) -> None:
+    rest = _copy(to, board)
+    for arg in args:
+        held = _copy(to, rest)
+        _keep(to, held, arg)
+        to.block.emit(Op.B_WITHOUT, rest, held)
+        to.block.release_boards(held)
+    to.block.emit(Op.B_WITHOUT, board, rest)
+    to.block.release_boards(rest)
 
 
 # -- the reset -----------------------------------------------------------------------------------------------
@@ -244,16 +243,15 @@ def reset(to: Expressions, computed: ComputedStatuses, homes: Homes) -> None:
         if status := entity.status if entity.role == "object" else entity.kind_code:
             to.block.emit(Op.LOAD, entity_register(entity.number, Field.STATUS), constant(status))
     for item in checked.setup:
-        mark = to.block.taken
-        _item(to, item)
-        to.block.release(mark)
+        with to.block.scratch():
+            _item(to, item)
     for entity in checked.entities:
         _drawn_status(to, entity)
     for frame in checked.frames:
         if start := first_state(frame):
             to.block.emit(Op.LOAD, registers.by_path[f"{frame.member}.frame"], constant(start))
     for item in checked.remembered:
-        _not_yet(to, registers.by_path[item.path])
+        _not_yet(to, item.path)
     computed.fix(to)
     homes.save(to)
     if to.has_drawn:  # everything is drawn once more when the code has run, into the bare room
@@ -276,20 +274,19 @@ def _drawn_status(to: Expressions, entity: Entity) -> None:
     if drawn is None:
         return
     register = entity_register(entity.number, Field.STATUS)
-    mark = to.block.taken
-    to.block.span = entity.span
-    with to.block.when(Op.IF_UNPINNED, register, 0):
-        to.block.emit(Op.LOAD, register, to.value(drawn))
-    to.block.release(mark)
+    with to.block.scratch():
+        to.block.span = entity.span
+        with to.block.when(Op.IF_UNPINNED, register, 0):
+            to.block.emit(Op.LOAD, register, to.value(drawn))
 
 
-def _not_yet(to: Expressions, register: int) -> None:
+def _not_yet(to: Expressions, path: str) -> None:
     """A value that nothing was remembered for yet, where 0 is no value of it."""
-    name = next(name for name in to.registers.names if name.register == register)
+    name = to.registers.named(path)
     if name.low <= 0 <= name.high:
         return
-    with to.block.when(Op.IF_UNPINNED, register, 0):
-        to.block.emit(Op.LOAD, register, constant(name.low))
+    with to.block.when(Op.IF_UNPINNED, name.register, 0):
+        to.block.emit(Op.LOAD, name.register, constant(name.low))
 
 
 def first_state(frame: FramePlan) -> int:
@@ -339,7 +336,7 @@ def _item(to: Expressions, item: Drawn | Coloring | Placing | Facing) -> None:
             block.span = item.span
             block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.X), 0, pinned)
             _only_if(to, item.when, item.site, pinned)
-            Places(to).put(item)
+            _put(to, item)
         case Facing():
             _facing(to, item, pinned)
     block.bind(pinned)

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.compiler.assembler import state_names
+from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.instruction_checks import (
     PathFacts,
-    Ranges,
     inbox_registers,
     problem_of,
     written_temporaries,
@@ -46,182 +46,172 @@ from socialai_dsl.program import (
     pack_cell,
 )
 from socialai_dsl.program.instructions import ANYTHING, TABLE
+from socialai_dsl.program.program import bounds_of
 from socialai_dsl.semantics.free_cells import interior_cells
 from socialai_dsl.semantics.plans import CheckedScenario, Entity, LookPlan, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
 
 
-class Tables:
-    """The tables of one scenario, laid out in the words of a program.
+def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
+    """Lay out everything of a scenario in the words of a program; see program.Header for the order.
 
     Registers of what is heard and of the log are reserved here, since only now it is known how many there are.
     """
+    checked, lines, code = allocation.checked, allocation.lines, allocation.code
+    registers, classes, sites = allocation.registers, allocation.classes, allocation.sites
+    frames, rules = lowered.frames, tuple(allocation.rules)
+    length = lines.history_length
+    heard_size = max(1, len(lines.speakers))
+    heard = registers.reserve(heard_size)
+    log_size = length // min((len(tokens) for tokens in lines.tokens), default=length)
+    log = registers.reserve(log_size)
 
-    def __init__(self, allocation: Allocation, lowered: LoweredCode) -> None:
-        self.allocation, self.lowered = allocation, lowered
-        self.checked, self.registers, self.classes = (
-            allocation.checked,
-            allocation.registers,
-            allocation.classes,
-        )
-        self.sites, self.lines, self.code = allocation.sites, allocation.lines, allocation.code
+    header = dict.fromkeys(Header, 0)
+    body: list[int] = []
 
-    def program(self) -> Program:
-        """Lay out everything; see program.Header for the order."""
-        frames, outcomes = self.lowered.frames, self.lowered.outcomes
-        rules = tuple(self.allocation.rules)
-        checked, lines = self.checked, self.lines
-        length = lines.history_length
-        heard_size = max(1, len(lines.speakers))
-        heard = self.registers.reserve(heard_size)
-        log_size = length // min((len(tokens) for tokens in lines.tokens), default=length)
-        log = self.registers.reserve(log_size)
+    def table(offset: Header, words: list[int]) -> None:
+        header[offset] = Header.END + len(body)
+        body.extend(words)
 
-        header = dict.fromkeys(Header, 0)
-        body: list[int] = []
+    types = _TypeTable(checked)
+    table(Header.CODE_AT, [word for row in code.instructions for word in row])
+    table(Header.ACTION_AT, [*(ACTIONS.index(action) for action in checked.actions), len(ACTIONS) - 1])
+    table(Header.CLASS_AT, classes.of_pair)
+    accepts = {number: registers.by_path[path] for number, path in checked.accepting}
+    rows = (_entity_row(entity, types, accepts) for entity in checked.entities)
+    table(Header.ENTITY_AT, [word for row in rows for word in row])
+    table(Header.TYPE_AT, [word for row in types.rows for word in row])
+    table(Header.ROOM_AT, room_templates(checked.room))
+    table(Header.FRAME_AT, _frame_rows(allocation, frames))
+    table(Header.STATE_AT, [word for frame in frames for row in frame.rows for word in row])
+    table(Header.OUTCOME_AT, lowered.outcomes)
+    table(Header.LINE_AT, _line_rows(lines))
+    table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
+    table(Header.SITE_AT, sites.words())
+    table(Header.CLASS_SET_AT, classes.set_words())
+    shown = [look for look in checked.looks if look.shown]
+    body += _look_rows(allocation, shown)
 
-        def table(offset: Header, words: list[int]) -> None:
-            header[offset] = Header.END + len(body)
-            body.extend(words)
+    header |= lowered.entries | {
+        Header.SIZE: Header.END + len(body),
+        Header.REGISTERS: max(registers.next_free, registers.end),
+        Header.CANVAS_WIDTH: checked.room.canvas[0],
+        Header.CANVAS_HEIGHT: checked.room.canvas[1],
+        Header.ENTITIES: len(checked.entities),
+        Header.NPCS: sum(entity.role == "npc" for entity in checked.entities),
+        Header.PRIMITIVES: len(checked.actions),
+        Header.TEMPLATES: len(checked.sentences.templates),
+        Header.NOUNS: checked.sentences.fillings,
+        Header.CLASSES: classes.count,
+        Header.HORIZON: checked.horizon,
+        Header.FLAGS: _flags(allocation),
+        Header.TOKENS: length,
+        Header.LOG: log,
+        Header.LOG_SIZE: log_size,
+        Header.HEARD: heard,
+        Header.HEARD_SIZE: heard_size,
+        Header.INBOX: allocation.inbox,
+        Header.INBOX_SIZE: allocation.inbox_size,
+        Header.FRAMES: len(frames),
+        Header.DEADLY: types.deadly,
+        Header.MIN_WIDTH: checked.room.width[0],
+        Header.MIN_HEIGHT: checked.room.height[0],
+        Header.HEIGHTS: checked.room.height[1] - checked.room.height[0] + 1,
+        Header.OUTSIDE: WALL_CELL,
+        Header.INSTRUCTIONS: len(code.instructions),
+        Header.LINES: len(lines.texts),
+        Header.STATES: sum(len(frame.rows) for frame in frames),
+        Header.SITES: len(sites.rows),
+        Header.TYPE_ROWS: len(types.rows),
+        Header.COUNTERS: len(rules) + len(checked.outcomes) + 3,
+        Header.AGENT_SAYS: lines.agent_says,
+        Header.SLOPE: checked.slope,
+        Header.EACH_STEP: checked.each_step,
+        Header.CLASS_SETS: len(classes.sets),
+        Header.CLASS_SET_WORDS: classes.words_of_a_set,
+        Header.CHANNELS: checked.channels + checked.shows_carrying,
+    }
+    words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
+    # Boards are sets of bits, so a word may use the sign bit.
+    return Program(
+        words=words.astype(np.uint64).astype(np.uint32).view(np.int32),
+        name=checked.name,
+        actions=checked.actions,
+        sentences=checked.sentences,
+        entities=tuple(_entity_name(entity) for entity in checked.entities),
+        registers=tuple(registers.names),
+        lines=tuple(lines.texts),
+        outcome_table=(
+            *(Outcome(o.name, o.success, o.condition.span) for o in checked.outcomes),
+            Outcome("deadly", False),
+            Outcome("timeout", False),
+        ),
+        rules=rules,
+        vocabulary=lines.vocabulary,
+        source_map=tuple(code.spans),
+        labels=dict(code.labels),
+        looks=tuple((look.name, look.words) for look in shown),
+    )
 
-        types = _TypeTable(checked)
-        table(Header.CODE_AT, [word for row in self.code.instructions for word in row])
-        table(Header.ACTION_AT, [*(ACTIONS.index(action) for action in checked.actions), len(ACTIONS) - 1])
-        table(Header.CLASS_AT, self.classes.of_pair)
-        accepts = {number: self.registers.by_path[path] for number, path in checked.accepting}
-        rows = (_entity_row(entity, types, accepts) for entity in checked.entities)
-        table(Header.ENTITY_AT, [word for row in rows for word in row])
-        table(Header.TYPE_AT, [word for row in types.rows for word in row])
-        table(Header.ROOM_AT, room_templates(checked.room))
-        table(Header.FRAME_AT, self._frame_rows(frames))
-        table(Header.STATE_AT, [word for frame in frames for row in frame.rows for word in row])
-        table(Header.OUTCOME_AT, outcomes)
-        table(Header.LINE_AT, self._line_rows())
-        table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
-        table(Header.SITE_AT, self.sites.words())
-        table(Header.CLASS_SET_AT, self.classes.set_words())
-        shown = [look for look in checked.looks if look.shown]
-        body += self._look_rows(shown)
 
-        header |= self.lowered.entries | {
-            Header.SIZE: Header.END + len(body),
-            Header.REGISTERS: max(self.registers.next_free, self.registers.end),
-            Header.CANVAS_WIDTH: checked.room.canvas[0],
-            Header.CANVAS_HEIGHT: checked.room.canvas[1],
-            Header.ENTITIES: len(checked.entities),
-            Header.NPCS: sum(entity.role == "npc" for entity in checked.entities),
-            Header.PRIMITIVES: len(checked.actions),
-            Header.TEMPLATES: len(checked.sentences.templates),
-            Header.NOUNS: checked.sentences.fillings,
-            Header.CLASSES: self.classes.count,
-            Header.HORIZON: checked.horizon,
-            Header.FLAGS: self._flags(),
-            Header.TOKENS: length,
-            Header.LOG: log,
-            Header.LOG_SIZE: log_size,
-            Header.HEARD: heard,
-            Header.HEARD_SIZE: heard_size,
-            Header.INBOX: self.allocation.inbox,
-            Header.INBOX_SIZE: self.allocation.inbox_size,
-            Header.FRAMES: len(frames),
-            Header.DEADLY: types.deadly,
-            Header.MIN_WIDTH: checked.room.width[0],
-            Header.MIN_HEIGHT: checked.room.height[0],
-            Header.HEIGHTS: checked.room.height[1] - checked.room.height[0] + 1,
-            Header.OUTSIDE: WALL_CELL,
-            Header.INSTRUCTIONS: len(self.code.instructions),
-            Header.LINES: len(lines.texts),
-            Header.STATES: sum(len(frame.rows) for frame in frames),
-            Header.SITES: len(self.sites.rows),
-            Header.TYPE_ROWS: len(types.rows),
-            Header.COUNTERS: len(rules) + len(checked.outcomes) + 3,
-            Header.AGENT_SAYS: lines.agent_says,
-            Header.SLOPE: checked.slope,
-            Header.EACH_STEP: checked.each_step,
-            Header.CLASS_SETS: len(self.classes.sets),
-            Header.CLASS_SET_WORDS: self.classes.words_of_a_set,
-            Header.CHANNELS: checked.channels + checked.shows_carrying,
+def _look_rows(allocation: Allocation, shown: list[LookPlan]) -> list[int]:
+    """The look table: for each entity the register of each look that the picture shows, 0 where it has none."""
+    registers = [dict(look.registers) for look in shown]
+    paths = (own.get(entity.number) for entity in allocation.checked.entities for own in registers)
+    return [0 if path is None else allocation.registers.by_path[path] for path in paths]
+
+
+def _flags(allocation: Allocation) -> int:
+    checked = allocation.checked
+    flags = {
+        Flag.NPCS_HIDDEN: checked.npcs_hidden,
+        Flag.PICTURE_BEFORE_NPCS: checked.picture_before_npcs,
+        Flag.AGENT_FRAME: any(frame.entity == 0 for frame in checked.frames),
+        Flag.OWN_VOICE: checked.own_voice,
+        Flag.EGOCENTRIC: checked.egocentric,
+        Flag.OCCLUSION: checked.room.occlusion,
+        Flag.ROLLS: any(entity.type and entity.type.rolls for entity in checked.entities),
+        Flag.HEARD_BY: allocation.classes.speakers_matter,
+        Flag.SETTLE_ALWAYS: allocation.computed.settle_always,
+        Flag.SHOWS_CARRYING: checked.shows_carrying,
+        Flag.CARRYING: any(entity.carryable for entity in checked.entities),
+    }
+    return sum(flag for flag, on in flags.items() if on)
+
+
+def _frame_rows(allocation: Allocation, frames: list[FrameCode]) -> list[int]:
+    words = []
+    first_row = 0
+    for made, frame in zip(frames, allocation.checked.frames, strict=True):
+        row = {
+            FrameColumn.ENTITY: frame.entity,
+            FrameColumn.STATE: allocation.registers.by_path[f"{frame.member}.frame"],
+            FrameColumn.CLOCK: allocation.registers.by_path[f"{frame.member}.clock"],
+            FrameColumn.ROWS: first_row,
+            FrameColumn.STATES: len(state_names(frame)),
+            FrameColumn.INBOX: allocation.inbox_of[frame.member],
+            FrameColumn.PERCEIVE: made.perceive,
+            FrameColumn.DEFERRED: made.deferred,
         }
-        words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
-        # Boards are sets of bits, so a word may use the sign bit.
-        return Program(
-            words=words.astype(np.uint64).astype(np.uint32).view(np.int32),
-            name=checked.name,
-            actions=checked.actions,
-            sentences=checked.sentences,
-            entities=tuple(_entity_name(entity) for entity in checked.entities),
-            registers=tuple(self.registers.names),
-            lines=tuple(lines.texts),
-            outcome_table=(
-                *(Outcome(o.name, o.success, o.condition.span) for o in checked.outcomes),
-                Outcome("deadly", False),
-                Outcome("timeout", False),
-            ),
-            rules=rules,
-            vocabulary=lines.vocabulary,
-            source_map=tuple(self.code.spans),
-            labels=dict(self.code.labels),
-            looks=tuple((look.name, look.words) for look in shown),
-        )
+        first_row += len(made.rows)
+        words += _in_columns(FrameColumn, row)
+    return words
 
-    def _look_rows(self, shown: list[LookPlan]) -> list[int]:
-        """The look table: for each entity the register of each look that the picture shows, 0 where it has none."""
-        registers = [dict(look.registers) for look in shown]
-        paths = (own.get(entity.number) for entity in self.checked.entities for own in registers)
-        return [0 if path is None else self.registers.by_path[path] for path in paths]
 
-    def _flags(self) -> int:
-        checked = self.checked
-        flags = {
-            Flag.NPCS_HIDDEN: checked.npcs_hidden,
-            Flag.PICTURE_BEFORE_NPCS: checked.picture_before_npcs,
-            Flag.AGENT_FRAME: any(frame.entity == 0 for frame in checked.frames),
-            Flag.OWN_VOICE: checked.own_voice,
-            Flag.EGOCENTRIC: checked.egocentric,
-            Flag.OCCLUSION: checked.room.occlusion,
-            Flag.ROLLS: any(entity.type and entity.type.rolls for entity in checked.entities),
-            Flag.HEARD_BY: self.classes.speakers_matter,
-            Flag.SETTLE_ALWAYS: self.allocation.computed.settle_always,
-            Flag.SHOWS_CARRYING: checked.shows_carrying,
-            Flag.CARRYING: any(entity.carryable for entity in checked.entities),
+def _line_rows(lines: Lines) -> list[int]:
+    words = []
+    first_token = 0
+    for line, (tokens, number, noun) in enumerate(zip(lines.tokens, lines.classes, lines.nouns, strict=True)):
+        row = {
+            LineColumn.FIRST_TOKEN: first_token,
+            LineColumn.TOKENS: len(tokens),
+            LineColumn.CLASS: number + (SECRET if line in lines.kept_secret else 0),
+            LineColumn.NOUN: noun,
         }
-        return sum(flag for flag, on in flags.items() if on)
-
-    def _frame_rows(self, frames: list[FrameCode]) -> list[int]:
-        words = []
-        first_row = 0
-        for made, frame in zip(frames, self.checked.frames, strict=True):
-            row = {
-                FrameColumn.ENTITY: frame.entity,
-                FrameColumn.STATE: self.registers.by_path[f"{frame.member}.frame"],
-                FrameColumn.CLOCK: self.registers.by_path[f"{frame.member}.clock"],
-                FrameColumn.ROWS: first_row,
-                FrameColumn.STATES: len(state_names(frame)),
-                FrameColumn.INBOX: self.allocation.inbox_of[frame.member],
-                FrameColumn.PERCEIVE: made.perceive,
-                FrameColumn.DEFERRED: made.deferred,
-            }
-            first_row += len(made.rows)
-            words += _in_columns(FrameColumn, row)
-        return words
-
-    def _line_rows(self) -> list[int]:
-        words = []
-        first_token = 0
-        lines = self.lines
-        for line, (tokens, number, noun) in enumerate(
-            zip(lines.tokens, lines.classes, lines.nouns, strict=True)
-        ):
-            row = {
-                LineColumn.FIRST_TOKEN: first_token,
-                LineColumn.TOKENS: len(tokens),
-                LineColumn.CLASS: number + (SECRET if line in lines.kept_secret else 0),
-                LineColumn.NOUN: noun,
-            }
-            words += _in_columns(LineColumn, row)
-            first_token += len(tokens)
-        return words
+        words += _in_columns(LineColumn, row)
+        first_token += len(tokens)
+    return words
 
 
 def _in_columns(columns: type[IntEnum], row: Mapping[Any, int]) -> list[int]:
@@ -363,20 +353,7 @@ class InvalidProgramError(AssertionError):
         super().__init__(f"internal: the program is refused: {message}")
 
 
-_ENTRIES = (
-    Header.RESET_PC,
-    Header.SETTLE_PC,
-    Header.RULES_PC,
-    Header.BEFORE_PC,
-    Header.LINKS_PC,
-    Header.REQUIRE_PC,
-    Header.TICK_PC,
-)
-
-
-def verify_code(program: Program) -> None:
-    """Raise InvalidProgramError unless every block that a table names is safe from its start to its HALTs."""
-    _Code(program).check()
+_ENTRIES = [word for word in Header if word.name.endswith("_PC")]
 
 
 @dataclass(frozen=True)
@@ -400,7 +377,7 @@ class _Code:
     def __init__(self, program: Program) -> None:
         self.program = program
         self.code = program.code.tolist()
-        self.ranges = Ranges.of(program)
+        self.ranges = bounds_of(program)
         named = frozenset(name.register for name in program.registers)
         set_up = frozenset(
             FIRST_ENTITY + ENTITY_FIELDS * entity + which
@@ -416,6 +393,7 @@ class _Code:
         self.is_agents = False
 
     def check(self) -> None:
+        """Raise InvalidProgramError unless every block that a table names is safe from its start to its HALTs."""
         if not self.code or self.code[0][0] != Op.HALT:
             raise InvalidProgramError("address 0 is not a HALT")
         for pc, entry in sorted(set(self._entries())):
@@ -430,8 +408,8 @@ class _Code:
             yield self.program.header(word), word
         for table in (Header.STATE_AT, Header.OUTCOME_AT):
             yield from ((pc, table) for pc in self.program.table(table).ravel().tolist())
-        for pc in _of_frames(self.program):
-            yield pc, Header.FRAME_AT
+        of_frames = self.program.table(Header.FRAME_AT)[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]]
+        yield from ((pc, Header.FRAME_AT) for pc in of_frames.ravel().tolist())
 
     def _block(self, start: int, entry: Header) -> None:
         pending: dict[int, _Path] = {
@@ -491,23 +469,14 @@ class _Code:
         if outer is not None or length < 1 or end >= len(self.code) or self.code[end][0] != Op.END_EACH:
             raise InvalidProgramError(f"at {pc}: a loop without its own end, or inside another")
         inside = {
-            temporary for instruction in self.code[pc + 1 : end] for temporary in self._written(instruction)
+            temporary
+            for instruction in self.code[pc + 1 : end]
+            for temporary in written_temporaries(*instruction)
         }
         for temporary in inside & known.temporaries.keys():
             known.temporaries[temporary] = ANYTHING
-        own = self._written(self.code[pc])
+        own = written_temporaries(*self.code[pc])
         return _Loop(end, frozenset(inside.union(own)), before)
-
-    @staticmethod
-    def _written(instruction: list[int]) -> range:
-        """What an op that is in no table writes is not asked: it is refused when it is reached."""
-        return written_temporaries(*instruction) if instruction[0] in TABLE else range(0)
-
-
-def _of_frames(program: Program) -> Iterator[int]:
-    """Addresses in the frame table."""
-    for row in program.table(Header.FRAME_AT).tolist():
-        yield from (row[FrameColumn.PERCEIVE], row[FrameColumn.DEFERRED])
 
 
 def _of_agent(program: Program) -> frozenset[int]:
@@ -532,23 +501,12 @@ def verify(program: Program) -> None:
     _inside(program, Header.ACTION_AT, program.header(Header.PRIMITIVES) + 1, 0, 7)
     pairs = program.header(Header.TEMPLATES) * program.header(Header.NOUNS)
     _inside(program, Header.CLASS_AT, pairs, 1, program.header(Header.CLASSES) - 1)
-    verify_code(program)
+    _Code(program).check()
 
 
 def _require(condition: bool, message: str) -> None:
     if not condition:
         raise InvalidProgramError(message)
-
-
-_TABLES = (
-    *(Header.CODE_AT, Header.ACTION_AT, Header.CLASS_AT, Header.ENTITY_AT, Header.TYPE_AT, Header.ROOM_AT),
-    *(Header.FRAME_AT, Header.STATE_AT, Header.OUTCOME_AT, Header.LINE_AT, Header.SITE_AT),
-    Header.CLASS_SET_AT,
-)
-
-
-def _sizes(program: Program) -> dict[Header, int]:
-    return {table: prod(program.shape(table)) for table in _TABLES}
 
 
 def _header(program: Program) -> None:
@@ -580,7 +538,8 @@ def _header(program: Program) -> None:
     _require(0 <= h(Header.SLOPE) <= 1000, f"SLOPE is {h(Header.SLOPE)}")
     for offset in _OFFSETS:
         _require(Header.END <= h(offset) <= len(program.words), f"{offset.name} is {h(offset)}")
-    for offset, size in _sizes(program).items():
+    for offset in _OFFSETS:
+        size = prod(program.shape(offset)) if offset != Header.TOKEN_AT else 0
         _require(h(offset) + size <= len(program.words), f"the table at {offset.name} is cut off")
     _registers(program)
 

@@ -77,10 +77,8 @@ class MemberSelection:
         """A temporary with a value that is computed for one of those, and else is any of its type."""
         block = self.to.block
         result = self.to.into_temporary(Op.LOAD, self.to.number(value.type.low))
-        with block.when(Op.IF_BIT, *_bit(self.bits, self._numbers[id(what)])):
-            mark = block.taken
+        with block.when(Op.IF_BIT, *_bit(self.bits, self._numbers[id(what)])), block.scratch():
             block.emit(Op.LOAD, result, computed())
-            block.release(mark)
         return result
 
 

@@ -28,7 +28,7 @@ from socialai_dsl.engine.state import (
     no_pins,
 )
 from socialai_dsl.engine.views import view_table
-from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
+from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, Op, Program, TypeColumn
 
 _PLAIN_CHANNELS: Final = 4
 _TWO_GESTURES: Final = 2
@@ -39,8 +39,7 @@ class LinkedProgram:
     """A program and how it is linked into a batch.
 
     Attributes:
-        words: the program, int32.
-        rules: number of counted rules.
+        program: the program.
         outcomes: the batch's number of each way to end, deadly and time-out included.
         actions: Body of each body action of the batch.
         templates: the program's own index of each of the batch's, -1 if it has no such.
@@ -48,21 +47,16 @@ class LinkedProgram:
         strides: for each template of the batch the filling that it has without its slots, and what a word of each slot
             of the batch counts in it, 0 if the template lacks the slot.
         tokens: the batch's id of each token id of the program.
-        successes: whether each way to end is a success.
-        name: what an error calls the program.
         looks: for each look that the program's picture shows its channel of the batch, counted from the fifth.
     """
 
-    words: NDArray[np.int32]
-    rules: int
+    program: Program
     outcomes: Sequence[int]
     actions: Sequence[int]
     templates: Sequence[int]
     slots: Sequence[Sequence[int]]
     strides: Sequence[Sequence[int]]
     tokens: Sequence[int]
-    successes: Sequence[bool]
-    name: str = ""
     looks: Sequence[int] = ()
 
 
@@ -96,9 +90,9 @@ class Batch:
         """
         _check_sequences(parts, [pools[number] for number in sequences])
         rows = self._rows = len(pool_of_row)
-        headers = [part.words for part in parts]
-        registers = max(int(words[Header.REGISTERS]) for words in headers)
-        board = max(_board_words(words) for words in headers)
+        programs = [part.program for part in parts]
+        registers = max(program.header(Header.REGISTERS) for program in programs)
+        board = max(_board_words(program) for program in programs)
         words, views, self.offsets, self.first_counters = _link(parts)
         starts = np.cumsum([0, *map(len, pools)])
         self.tables = Tables(
@@ -109,7 +103,7 @@ class Batch:
         )
         self.more = _more(parts)
         self.state: State = empty_state(rows, registers, board, length, VIEW, self.more)
-        counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
+        counters = sum(program.header(Header.COUNTERS) for program in programs)
         self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots), self.more)
         self.counters = self.ports.counters
         for row, pool in enumerate(pool_of_row):
@@ -117,7 +111,7 @@ class Batch:
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32 | in_sequence << 63
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         self._pool_starts = starts.tolist()
-        self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
+        self._names = [program.name for program in programs]
         self._book = make_book((*self.tables, *self.state, *self.ports, self.ports.actions.reshape(-1)))
 
     def program_numbers(self) -> NDArray[np.intp]:
@@ -203,9 +197,9 @@ class Batch:
         )
 
 
-def _board_words(header: NDArray[np.int32]) -> int:
+def _board_words(program: Program) -> int:
     """Words of a program's board."""
-    width, height = int(header[Header.CANVAS_WIDTH]), int(header[Header.CANVAS_HEIGHT])
+    width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
     return width * height + 1 + 2 * height + width
 
 
@@ -213,7 +207,7 @@ def _check_sequences(parts: Sequence[LinkedProgram], sequences: Sequence[Sequenc
     """The clock of an episode in acts is one, so its end must be."""
     for sequence in sequences:
         acts = [parts[number] for number in sequence]
-        horizons = {int(part.words[Header.HORIZON]) for part in acts}
+        horizons = {part.program.header(Header.HORIZON) for part in acts}
         assert len(horizons) == 1, f"internal: acts of one episode have the horizons {sorted(horizons)}"
 
 
@@ -226,18 +220,15 @@ def _link(
     views: dict[tuple[int, int], int] = {}
     offsets, first_counters = [], []
     offset, counter, poses = 0, 0, 0
-    for number, part in enumerate(parts):
-        canvas = int(part.words[Header.CANVAS_WIDTH]), int(part.words[Header.CANVAS_HEIGHT])
+    for part in parts:
+        program, h = part.program, part.program.header
+        canvas = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
         if canvas not in views:
             views[canvas] = poses
             poses += canvas[0] * canvas[1] * 4
-        assert len(part.successes) == len(part.outcomes), (
-            "internal: ways to end that are neither success nor not"
-        )
         link = np.zeros(Link.END, np.int32)
-        link[Link.NUMBER] = number
         link[Link.COUNTERS] = counter
-        link[Link.RULES] = part.rules
+        link[Link.RULES] = len(program.rules)
         link[Link.OUTCOMES] = len(part.outcomes)
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
@@ -249,22 +240,21 @@ def _link(
             (Link.SIZE_AT, [*map(len, part.slots)]),
             (Link.WORD_AT, [*chain(*part.slots)]),
             (Link.ENDING_AT, part.outcomes),
-            (Link.SUCCESS_AT, part.successes),
+            (Link.SUCCESS_AT, [outcome.success for outcome in program.outcome_table]),
             (Link.LOOK_AT, part.looks),
         ):
-            link[place] = len(part.words) + len(link) + len(tables)
+            link[place] = h(Header.SIZE) + len(link) + len(tables)
             tables += table
-        own = _with_tokens(part)
-        entities = int(own[Header.ENTITIES])
         link[Link.MORE], link[Link.LOOKS] = more, len(part.looks)
-        link[Link.LOOK_REGISTER_AT] = len(own) - entities * len(part.looks)
-        link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
-        own[Header.FLAGS] |= _traits(own) | shown
+        link[Link.LOOK_REGISTER_AT] = h(Header.SIZE) - h(Header.ENTITIES) * len(part.looks)
+        link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(program)
+        own = _with_tokens(part)
+        own[Header.FLAGS] |= _traits(program) | shown
         words += [own, link, np.array(tables, np.int32)]
         offsets.append(offset)
         first_counters.append(counter)
-        offset += len(part.words) + len(link) + len(tables)
-        counter += int(part.words[Header.COUNTERS])
+        offset += len(own) + len(link) + len(tables)
+        counter += h(Header.COUNTERS)
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
 
 
@@ -272,11 +262,11 @@ def _shown(parts: Sequence[LinkedProgram]) -> int:
     """What the channels behind the fourth show if one of the programs has them, as bits of `Trait`."""
     shown = 0
     for part in parts:
-        carrying = int(part.words[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
+        carrying = part.program.header(Header.FLAGS) & Flag.SHOWS_CARRYING != 0
         shown |= (Trait.HANDS | Trait.MORE) * carrying
-        gestures = part.words[Header.CHANNELS] - carrying - _PLAIN_CHANNELS
-        shown |= Trait.GESTURES * int(gestures > 0)
-        shown |= (Trait.CELLS | Trait.MORE) * int(gestures > _TWO_GESTURES)
+        gestures = part.program.header(Header.CHANNELS) - carrying - _PLAIN_CHANNELS
+        shown |= Trait.GESTURES * (gestures > 0)
+        shown |= (Trait.CELLS | Trait.MORE) * (gestures > _TWO_GESTURES)
         shown |= Trait.MORE * bool(part.looks)
     return shown
 
@@ -288,58 +278,42 @@ def _more(parts: Sequence[LinkedProgram]) -> int:
     return max((others, *(1 + place for part in parts for place in part.looks)))
 
 
-def _traits(words: NDArray[np.int32]) -> int:
+def _traits(program: Program) -> int:
     """What may happen in a program, as bits of `Trait`."""
-    traits = 0
-    if words[Header.TICK_PC] or words[Header.FLAGS] & Flag.ROLLS:
+    traits, h = 0, program.header
+    if h(Header.TICK_PC) or h(Header.FLAGS) & Flag.ROLLS:
         traits |= Trait.GOES_BY_ITSELF
-    types, starts = _types(words)
+    types, starts = program.table(Header.TYPE_AT), _types(program)
     # What has one status only cannot change it.
     status = np.arange(len(types)) - starts[np.searchsorted(starts, np.arange(len(types)), "right") - 1]
     if (types[:, TypeColumn.PUSHED] != status).any():
         traits |= Trait.PUSHED
-    first, rows = int(words[Header.FRAME_AT]), int(words[Header.FRAMES])
-    frames = words[first : first + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
-    if frames[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]].any():
+    if program.table(Header.FRAME_AT)[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]].any():
         traits |= Trait.APART
-    first, rows = int(words[Header.CODE_AT]), int(words[Header.INSTRUCTIONS])
-    if words[Header.EACH_STEP] or (words[first : first + 4 * rows : 4] == Op.REWARD).any():
+    if h(Header.EACH_STEP) or (program.code[:, 0] == Op.REWARD).any():
         traits |= Trait.REWARDS
     return traits
 
 
-def _entities(words: NDArray[np.int32]) -> NDArray[np.int32]:
-    """The entity table, (entities, columns)."""
-    first, rows = int(words[Header.ENTITY_AT]), int(words[Header.ENTITIES])
-    return words[first : first + rows * EntityColumn.COLUMNS].reshape(rows, EntityColumn.COLUMNS)
+def _types(program: Program) -> NDArray[np.int32]:
+    """Where each type begins in the type table: it has as many rows as it is far to the next."""
+    return np.unique(program.table(Header.ENTITY_AT)[:, EntityColumn.TYPE])
 
 
-def _types(words: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The type table, (rows, columns), and where each type begins: it has as many rows as it is far to the next."""
-    first, rows = int(words[Header.TYPE_AT]), int(words[Header.TYPE_ROWS])
-    types = words[first : first + rows * TypeColumn.COLUMNS].reshape(rows, TypeColumn.COLUMNS)
-    return types, np.unique(_entities(words)[:, EntityColumn.TYPE])
-
-
-def _rolling(words: NDArray[np.int32]) -> tuple[int, int]:
+def _rolling(program: Program) -> tuple[int, int]:
     """The first and the last entity that may ever roll; 0 and -1 if none may."""
-    types, starts = _types(words)
+    types, starts = program.table(Header.TYPE_AT), _types(program)
     ends = [*starts[1:], len(types)]
     rolling = [
         first for first, end in zip(starts, ends, strict=True) if types[first:end, TypeColumn.ROLLS].any()
     ]
-    found = np.flatnonzero(np.isin(_entities(words)[:, EntityColumn.TYPE], rolling))
+    found = np.flatnonzero(np.isin(program.table(Header.ENTITY_AT)[:, EntityColumn.TYPE], rolling))
     return (int(found[0]), int(found[-1])) if len(found) else (0, -1)
 
 
 def _with_tokens(part: LinkedProgram) -> NDArray[np.int32]:
     """The program's words with the batch's token ids."""
-    words = part.words.copy()
-    lines = int(words[Header.LINES])
-    if lines:
-        columns = int(LineColumn.COLUMNS)
-        table = words[words[Header.LINE_AT] :][: columns * lines].reshape(lines, columns)
-        start = int(words[Header.TOKEN_AT])
-        end = start + int((table[:, LineColumn.FIRST_TOKEN] + table[:, LineColumn.TOKENS]).max())
-        words[start:end] = np.asarray(part.tokens, np.int32)[words[start:end]]
+    words = part.program.words.copy()
+    start, end = part.program.header(Header.TOKEN_AT), part.program.header(Header.SITE_AT)
+    words[start:end] = np.asarray(part.tokens, np.int32)[words[start:end]]
     return words

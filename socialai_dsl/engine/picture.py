@@ -21,15 +21,7 @@ _HALF = np.int64(VIEW // 2)
 _EVERYWHERE = np.uint64((1 << 64) - 1)
 _WITH_GESTURES = 6
 _WITH_CELLS = 8
-_WORDS_OF_ACTS = {
-    Body.FORWARD: "forward",
-    Body.LEFT: "left",
-    Body.RIGHT: "right",
-    Body.TOGGLE: "toggle",
-    Body.POINT: "point",
-    Body.STOP_POINTING: "stop",
-}
-_ACTS = tuple(LAST_ACTS[_WORDS_OF_ACTS.get(body, "none")] for body in Body)
+_ACTS = tuple(LAST_ACTS.get(body.name.lower().removesuffix("_pointing"), LAST_ACTS["none"]) for body in Body)
 """The code in the sixth channel for each `Body`."""
 
 

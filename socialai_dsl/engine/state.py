@@ -61,27 +61,26 @@ class Link(IntEnum):
     Those that end in AT are addresses in the words of the program.
     """
 
-    NUMBER = 0  # of the program in the batch
-    COUNTERS = 1  # first counter
-    RULES = 2  # counters of rules, then come those of outcomes
-    OUTCOMES = 3  # ways to end, deadly and time-out included
-    VIEWS = 4  # first row of the views
-    ACTIONS = 5  # choices of the batch's action space
-    TEMPLATES = 6
-    SLOTS = 7
-    FIRST_ROLLING = 8  # the first and the last entity that may ever roll
-    LAST_ROLLING = 9
-    MORE = 10  # channels of the batch behind the fourth
-    LOOKS = 11  # how many looks the program shows
-    TEMPLATE_AT = 12  # for each template of the batch the program's own; -1 if it has none
-    STRIDE_AT = 13  # for each template its filling without slots, and what the word of each slot counts
-    SIZE_AT = 14  # for each slot how many words it has in the batch
-    WORD_AT = 15  # for each word of each slot the program's own; -1 if it has none
-    ENDING_AT = 16  # for each way to end the batch's own
-    SUCCESS_AT = 17  # for each way to end whether it is a success
-    LOOK_AT = 18  # for each look its channel, counted from the fifth
-    LOOK_REGISTER_AT = 19  # for each entity the register of each look
-    END = 20
+    COUNTERS = 0  # first counter
+    RULES = 1  # counters of rules, then come those of outcomes
+    OUTCOMES = 2  # ways to end, deadly and time-out included
+    VIEWS = 3  # first row of the views
+    ACTIONS = 4  # choices of the batch's action space
+    TEMPLATES = 5
+    SLOTS = 6
+    FIRST_ROLLING = 7  # the first and the last entity that may ever roll
+    LAST_ROLLING = 8
+    MORE = 9  # channels of the batch behind the fourth
+    LOOKS = 10  # how many looks the program shows
+    TEMPLATE_AT = 11  # for each template of the batch the program's own; -1 if it has none
+    STRIDE_AT = 12  # for each template its filling without slots, and what the word of each slot counts
+    SIZE_AT = 13  # for each slot how many words it has in the batch
+    WORD_AT = 14  # for each word of each slot the program's own; -1 if it has none
+    ENDING_AT = 15  # for each way to end the batch's own
+    SUCCESS_AT = 16  # for each way to end whether it is a success
+    LOOK_AT = 17  # for each look its channel, counted from the fifth
+    LOOK_REGISTER_AT = 18  # for each entity the register of each look
+    END = 19
 
 
 class Trait(IntEnum):

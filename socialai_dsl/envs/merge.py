@@ -103,16 +103,13 @@ def _parts(suite: ProgramSuite, playable: Playable, channels: Sequence[str]) -> 
     ending = {name: i for i, name in enumerate(playable.outcomes)}
     return tuple(
         LinkedProgram(
-            words=program.words,
-            rules=len(program.rules),
+            program,
             outcomes=[ending[name] for name in _endings(member, program, playable)],
             actions=[*(_body(program, word) for word in suite.actions), int(Body.NONE)],
             templates=list(templates),
             slots=[list(own) for own in slots],
             strides=_strides(program.sentences, suite.sentences, templates),
             tokens=[token[word] for word in program.vocabulary],
-            name=program.name,
-            successes=[outcome.success for outcome in program.outcome_table],
             looks=[channels.index(name) - len(LOOKS) for name, _ in program.looks],
         )
         for member, program, templates, slots in zip(

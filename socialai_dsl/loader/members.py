@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
@@ -336,20 +336,12 @@ def _leaf_members(suite: ResolvedFile, split: str | None, found: DiagnosticBag) 
             hint = "give `scenario: file.yaml` at one of its values, or at the tree's own level"
             found.error("S105", message, suite.tree.value_span(place), hint=hint)
         elif leaf.scenario not in scenarios:
-            scenarios[leaf.scenario] = _included(suite, leaf.scenario, found)
+            member = _member(suite, leaf.scenario, found)
+            scenarios[leaf.scenario] = member.scenario if member is not None else None
     _check_parameters(suite, tree, leaves, scenarios, found)
     played = _split_leaves(suite, leaves, split, found) if split is not None else leaves
     made = (_leaf_member(suite, leaf, scenarios.get(leaf.scenario or ()), found) for leaf in played)
     return [member for member in made if member is not None]
-
-
-def _included(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> ResolvedFile | None:
-    try:
-        scenario = suite.include(place)
-    except ScenarioError as error:
-        found.extend(error.diagnostics)
-        return None
-    return scenario if _can_be_played(suite, scenario, place, found) else None
 
 
 def _leaf_member(
@@ -413,18 +405,14 @@ def _split_leaves(
     if not isinstance(chosen, dict):
         return tuple(leaves)
     kept = tuple(leaves)
-    tests: list[tuple[str, Callable[[bool], bool]]] = [
-        ("only", lambda has: has),
-        ("without", lambda h: not h),
-    ]
-    for word, keeps in tests:
+    for word, has in (("only", True), ("without", False)):
         wanted = _mapping(chosen, word)
         if wanted is None:
             continue
         place: DataPath = ("splits", split, word)
         if not _are_known(suite, leaves, wanted, place, found):
             return tuple(leaves)
-        kept = tuple(leaf for leaf in kept if keeps(_has(leaf, wanted)))
+        kept = tuple(leaf for leaf in kept if _has(leaf, wanted) is has)
     if not kept and leaves:
         found.error("S504", f"no leaf is in the split `{split}`", suite.tree.key_span(("splits", split)))
     return kept

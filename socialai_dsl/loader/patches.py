@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader.reader import MAX_PATCH_PATH
 from socialai_dsl.source import Node, Span
 
@@ -187,33 +187,29 @@ def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
         return []
     if not isinstance(section.children, list):
         message = f"`remove` is a list of paths, not {section.kind}"
-        found.add(Diagnostic("S104", message, section.value_span(), hint="remove: [cast.anna]"))
+        found.error("S104", message, section.value_span(), hint="remove: [cast.anna]")
         return []
     # All paths mean the scenario before anything is removed: indices do not shift.
     places: list[tuple[Place, Edit]] = []
     for item in section.children:
         if not isinstance(item.value, str):
-            found.add(Diagnostic("S104", f"a path is a text, not {item.kind}", item.value_span()))
+            found.error("S104", f"a path is a text, not {item.kind}", item.value_span())
             continue
         place = _existing(root, item.value, item.value_span(), found)
         if place is None or place.node is None:
             continue
         edit = Edit("remove", item.value, item.value_span())
         if any(place.node is earlier.node for earlier, _ in places):
-            found.add(Diagnostic("S501", f"`{item.value}` is removed twice", edit.span))
+            found.error("S501", f"`{item.value}` is removed twice", edit.span)
         else:
             places.append((place, edit))
     for place, _ in places:
-        _take_out(place)
+        siblings = place.parent.children
+        if isinstance(siblings, dict):
+            del siblings[str(place.key)]
+        elif isinstance(siblings, list):
+            place.parent.children = [part for part in siblings if part is not place.node]
     return [edit for _, edit in places]
-
-
-def _take_out(place: Place) -> None:
-    siblings = place.parent.children
-    if isinstance(siblings, dict):
-        del siblings[str(place.key)]
-    elif isinstance(siblings, list):
-        place.parent.children = [part for part in siblings if part is not place.node]
 
 
 def _set(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
@@ -242,14 +238,14 @@ def _add(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]
     if isinstance(target.children, dict):
         return _add_keys(target.children, path, value, found)
     message = f"nothing can be added to `{path}`: it is {target.kind}"
-    found.add(Diagnostic("S104", message, span, hint="to replace it use `set`"))
+    found.error("S104", message, span, hint="to replace it use `set`")
     return []
 
 
 def _append(target: Node, items: list[Node], path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
     if not isinstance(value.children, list):
         message = f"`{path}` in {target.file} is a list: give a list of items to add, not {value.kind}"
-        found.add(Diagnostic("S104", message, value.value_span()))
+        found.error("S104", message, value.value_span())
         return []
     items.extend(value.children)
     return [Edit("add", path, value.key_span())]
@@ -258,13 +254,13 @@ def _append(target: Node, items: list[Node], path: str, value: Node, found: Diag
 def _add_keys(entries: dict[str, Node], path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
     if not isinstance(value.children, dict):
         message = f"`{path}` is a mapping: give the keys to add with their values, not {value.kind}"
-        found.add(Diagnostic("S104", message, value.value_span()))
+        found.error("S104", message, value.value_span())
         return []
     for key, part in value.children.items():
         if key in entries:
             there = entries[key].key_span()
             message = f"`{path}.{key}` exists already ({there.file}:{there.line})"
-            found.add(Diagnostic("S502", message, part.key_span(), hint="to replace it use `set`"))
+            found.error("S502", message, part.key_span(), hint="to replace it use `set`")
         else:
             entries[key] = part
     return [Edit("add", path, value.key_span())]
@@ -273,7 +269,7 @@ def _add_keys(entries: dict[str, Node], path: str, value: Node, found: Diagnosti
 def _place(root: Node, path: str, value: Node, found: DiagnosticBag) -> Place | None:
     """Where a patch puts a value: an existing part, or a new key of an existing mapping."""
     if len(path) > MAX_PATCH_PATH:
-        found.add(Diagnostic("S004", f"a path has at most {MAX_PATCH_PATH} characters", value.key_span()))
+        found.error("S004", f"a path has at most {MAX_PATCH_PATH} characters", value.key_span())
         return None
     place = follow(root, path)
     section = path.split(".", 1)[0]
@@ -332,19 +328,17 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
             suggestion = did_you_mean(key, VARIANT_KEYS)
             hint = None if suggestion else "a variant has `of`, `remove`, `set`, `add` and `about`"
             message = f"unknown key `{key}` in a variant"
-            found.add(Diagnostic("S101", message, part.key_span(), hint=hint, suggestion=suggestion))
+            found.error("S101", message, part.key_span(), hint=hint, suggestion=suggestion)
     base = root.entry("of")
     if base is None:
         hint = "of: base.yaml, or `of: any` for every scenario"
-        found.add(
-            Diagnostic("S105", "a variant needs `of`: what it is a variant of", root.key_span(), hint=hint)
-        )
+        found.error("S105", "a variant needs `of`: what it is a variant of", root.key_span(), hint=hint)
     elif not isinstance(base.value, str):
-        found.add(Diagnostic("S104", f"`of` names a file, it is not {base.kind}", base.value_span()))
+        found.error("S104", f"`of` names a file, it is not {base.kind}", base.value_span())
     for key in ("variant", "about", "notes"):
         entry = root.entry(key)
         if entry is not None and not isinstance(entry.value, str):
-            found.add(Diagnostic("S104", f"`{key}` is a text, not {entry.kind}", entry.value_span()))
+            found.error("S104", f"`{key}` is a text, not {entry.kind}", entry.value_span())
     for key in ("skills", "remove"):
         _check_texts(root, key, found)
     for key in ("set", "add"):
@@ -353,13 +347,9 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
             _not_a_mapping(key, section, found)
         for path, node in section.walk() if section is not None else ():
             if node.is_empty and path:
-                found.add(_nothing_for(path[-1], node))
-
-
-def _nothing_for(key: str | int, node: Node) -> Diagnostic:
-    what = f"nothing is given for `{key}`" if isinstance(key, str) else "an item of this list is empty"
-    hint = "write a value, or leave the key out"
-    return Diagnostic("S104", what, node.key_span(), hint=hint)
+                of_key = isinstance(path[-1], str)
+                what = f"nothing is given for `{path[-1]}`" if of_key else "an item of this list is empty"
+                found.error("S104", what, node.key_span(), hint="write a value, or leave the key out")
 
 
 def _check_texts(root: Node, key: str, found: DiagnosticBag) -> None:
@@ -369,17 +359,15 @@ def _check_texts(root: Node, key: str, found: DiagnosticBag) -> None:
     if not isinstance(section.children, list):
         hint = "remove: [cast.anna]" if key == "remove" else None
         what = "a list of paths" if key == "remove" else "a list of texts"
-        found.add(
-            Diagnostic("S104", f"`{key}` is {what}, not {section.kind}", section.value_span(), hint=hint)
-        )
+        found.error("S104", f"`{key}` is {what}, not {section.kind}", section.value_span(), hint=hint)
         return
     for item in section.children:
         if not isinstance(item.value, str):
             what = "a path" if key == "remove" else "a skill"
-            found.add(Diagnostic("S104", f"{what} is a text, not {item.kind}", item.value_span()))
+            found.error("S104", f"{what} is a text, not {item.kind}", item.value_span())
 
 
 def _not_a_mapping(verb: str, section: Node, found: DiagnosticBag) -> None:
     message = f"`{verb}` is a mapping from paths to values, not {section.kind}"
     hint = f"{verb}: {{cast.anna.name: Anna}}"
-    found.add(Diagnostic("S104", message, section.value_span(), hint=hint))
+    found.error("S104", message, section.value_span(), hint=hint)

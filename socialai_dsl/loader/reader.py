@@ -6,8 +6,8 @@ import math
 import os
 import re
 import stat
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
@@ -374,21 +374,17 @@ class _LimitError(Exception):
     """Reading stops here; the reason is among the findings."""
 
 
+@dataclass(slots=True)
 class _Frame:
     """A mapping or list that is being filled."""
 
-    __slots__ = ("container", "first_lines", "flow", "is_key", "key", "key_span", "path")
-
-    def __init__(
-        self, container: dict[str, Node] | list[Node], path: DataPath, flow: bool, is_key: bool
-    ) -> None:
-        self.container = container
-        self.path = path
-        self.flow = flow
-        self.is_key = is_key
-        self.key: str | None = None
-        self.key_span: Span | None = None
-        self.first_lines: dict[str, int] = {}
+    container: dict[str, Node] | list[Node]
+    path: DataPath
+    flow: bool
+    is_key: bool
+    key: str | None = None
+    key_span: Span | None = None
+    first_lines: dict[str, int] = field(default_factory=dict)
 
     @property
     def expects_key(self) -> bool:
@@ -410,10 +406,10 @@ class _Builder:
         self._stack: list[_Frame] = []
         self._events = 0
         self._documents = 0
-        self._take = {
+        self._take: dict[type, Callable[[Any], None]] = {
             yaml.ScalarEvent: self._scalar,
-            yaml.MappingStartEvent: self._mapping,
-            yaml.SequenceStartEvent: self._sequence,
+            yaml.MappingStartEvent: lambda event: self._open({}, event, Style.MAPPING),
+            yaml.SequenceStartEvent: lambda event: self._open([], event, Style.SEQUENCE),
             yaml.MappingEndEvent: self._end,
             yaml.SequenceEndEvent: self._end,
             yaml.AliasEvent: self._alias,
@@ -556,12 +552,6 @@ class _Builder:
     def _start(self, event: Any) -> Span:
         mark = event.start_mark
         return Span(self.source.name, mark.line + 1, mark.column + 1)
-
-    def _mapping(self, event: Any) -> None:
-        self._open({}, event, Style.MAPPING)
-
-    def _sequence(self, event: Any) -> None:
-        self._open([], event, Style.SEQUENCE)
 
     def _open(self, container: dict[str, Node] | list[Node], event: Any, style: Style) -> None:
         self._refuse_properties(event)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -87,7 +87,9 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
         return ScenarioName(NamePart("", start), (), {})
 
     question = len(text) if _is_file(text, folder) else _index(text, "?", 0)
-    plus = question if _is_file(text[:question], folder) else _plus(text, question)
+    plus = question
+    if not _is_file(text[:question], folder):  # the first `+` of the last part of the path
+        plus = min(question, _index(text, "+", text.rfind("/", 0, question) + 1))
     variants = _pieces(text, "+", plus + 1, question, start)
     for variant in variants:
         if not _VARIANT.fullmatch(variant.text):
@@ -111,11 +113,6 @@ def _is_file(text: str, folder: Path | None) -> bool:
 def _index(text: str, character: str, begin: int) -> int:
     found = text.find(character, begin)
     return len(text) if found < 0 else found
-
-
-def _plus(text: str, question: int) -> int:
-    """The first `+` of the last part of the path."""
-    return min(question, _index(text, "+", text.rfind("/", 0, question) + 1))
 
 
 def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tuple[NamePart, ...]:
@@ -194,159 +191,159 @@ class Build:
 
     def copy(self) -> Build:
         """The same, free to be changed further."""
-        return Build(
-            self.tree.copy(),
-            self.kind,
-            self.name,
-            self.path,
-            list(self.lineage),
-            list(self.edits),
-            list(self.passed_on),
-            list(self.own_variants),
+        return replace(
+            self,
+            tree=self.tree.copy(),
+            lineage=[*self.lineage],
+            edits=[*self.edits],
+            passed_on=[*self.passed_on],
+            own_variants=[*self.own_variants],
         )
 
 
-class Builder:
-    """Puts scenarios together from the files of one library."""
+def _built(library: Library, path: Path, asked: Span | None = None, chain: tuple[Path, ...] = ()) -> Build:
+    """A file with `extends` and, for a variant, with what it is a variant of.
 
-    def __init__(self, library: Library) -> None:
-        self.library = library
+    Args:
+        library: reads the files.
+        path: the file, resolved.
+        asked: where its name is written; None if it was given from outside.
+        chain: the files that build on it.
 
-    def built(self, path: Path, asked: Span | None = None, chain: tuple[Path, ...] = ()) -> Build:
-        """A file with `extends` and, for a variant, with what it is a variant of.
+    Raises:
+        ScenarioError: what is wrong with it or with a file it builds on.
+    """
+    if asked is not None:
+        _check_chain(library, path, chain, asked)
+    root, kind = _read(library, path, asked)
+    declared = root.text(kind) or ""
+    name = declared if _DECLARED_NAME.fullmatch(declared) else path.stem
+    lineage = [Ancestor(path.parent, path.stem, path)]
+    if kind == "variant" and root.text("of") != ANY:
+        base = _base(library, root, "of", path, chain)
+        _apply(library, base, root)
+        built = Build(base.tree, base.kind, name, path, lineage + base.lineage, base.edits)
+        if base.kind == "suite":
+            _pass_on(built, base, root)
+        return built
+    if root.entry("extends") is not None:
+        root = _extended(library, root, kind, path, chain)
+    return Build(root, kind, name, path, lineage)
 
-        Args:
-            path: the file, resolved.
-            asked: where its name is written; None if it was given from outside.
-            chain: the files that build on it.
 
-        Raises:
-            ScenarioError: what is wrong with it or with a file it builds on.
-        """
-        if asked is not None:
-            self.check_chain(path, chain, asked)
-        root, kind = self.read(path, asked)
-        declared = root.text(kind) or ""
-        name = declared if _DECLARED_NAME.fullmatch(declared) else path.stem
-        lineage = [Ancestor(path.parent, path.stem, path)]
-        if kind == "variant" and root.text("of") != ANY:
-            base = self._base(root, "of", path, chain)
-            self.patch(base, root)
-            built = Build(base.tree, base.kind, name, path, lineage + base.lineage, base.edits)
-            if base.kind == "suite":
-                self._pass_on(built, base, root)
-            return built
-        if root.entry("extends") is not None:
-            root = self._extended(root, kind, path, chain)
-        return Build(root, kind, name, path, lineage)
+def _pass_on(built: Build, base: Build, root: Node) -> None:
+    """A suite's variant that is named directly is passed on to the members like one that is named by `+`."""
+    built.passed_on, built.own_variants = list(base.passed_on), list(base.own_variants)
+    stem = base.lineage[0].stem + "_"
+    declared = root.entry("variant")
+    if declared is not None and built.path.stem.startswith(stem):
+        variant = NamePart(built.path.stem.removeprefix(stem), declared.value_span())
+        built.passed_on.append(variant)
+        built.own_variants.append(variant.text)
 
-    @staticmethod
-    def _pass_on(built: Build, base: Build, root: Node) -> None:
-        """A suite's variant that is named directly is passed on to the members like one that is named by `+`."""
-        built.passed_on, built.own_variants = list(base.passed_on), list(base.own_variants)
-        stem = base.lineage[0].stem + "_"
-        declared = root.entry("variant")
-        if declared is not None and built.path.stem.startswith(stem):
-            variant = NamePart(built.path.stem.removeprefix(stem), declared.value_span())
-            built.passed_on.append(variant)
-            built.own_variants.append(variant.text)
 
-    def read(self, path: Path, asked: Span | None) -> tuple[Node, str]:
-        """A file as a tree of its own, and its kind; a variant's shape is checked, since no model sees it."""
-        root = self.library.read(path, asked)
-        kind = self._kind(root)
-        if kind == "variant":
-            found = DiagnosticBag()
-            check_variant(root, found)
-            found.raise_errors(self.library.sources)
-        return root, kind
-
-    def patch(self, build: Build, patch: Node) -> None:
-        """Apply a patch.
-
-        Raises:
-            ScenarioError: with everything that is wrong with it.
-        """
+def _read(library: Library, path: Path, asked: Span | None) -> tuple[Node, str]:
+    """A file as a tree of its own, and its kind; a variant's shape is checked, since no model sees it."""
+    root = library.read(path, asked)
+    kind = _kind_of(library, root)
+    if kind == "variant":
         found = DiagnosticBag()
-        build.edits += apply_patch(build.tree, patch, found)
-        found.raise_errors(self.library.sources)
-        self.check_depth(build.tree)
+        check_variant(root, found)
+        found.raise_errors(library.sources)
+    return root, kind
 
-    def check_chain(self, path: Path, chain: tuple[Path, ...], asked: Span) -> None:
-        """Whether `path` may be built on by the files of `chain`.
 
-        Raises:
-            ScenarioError: S506 if it is one of them, S507 if they are too many.
-        """
-        if path in chain:
-            circle = " → ".join(p.name for p in (*chain[chain.index(path) :], path))
-            raise self.library.error("S506", f"these files build on each other in a circle: {circle}", asked)
-        if len(chain) >= MAX_CHAIN:
-            raise self.library.error("S507", f"more than {MAX_CHAIN} files build on each other", asked)
+def _apply(library: Library, build: Build, patch: Node) -> None:
+    """Apply a patch.
 
-    def _base(self, root: Node, key: str, path: Path, chain: tuple[Path, ...]) -> Build:
-        """What the file named at `key` (`of` or `extends`) is."""
-        entry = root.entry(key)
-        assert entry is not None, "internal: the key was looked at before"
-        span = entry.value_span()
-        if not isinstance(entry.value, str):
-            raise self.library.error("S104", f"`{key}` names one file, it is not {entry.kind}", span)
-        build = self.built(self.library.find(entry.value, path.parent, span), span, (*chain, path))
-        if build.kind == "variant":
-            message = f"`{entry.value}` is a variant of any scenario; nothing can be built on it"
-            raise self.library.error("S108", message, span)
-        return build
+    Raises:
+        ScenarioError: with everything that is wrong with it.
+    """
+    found = DiagnosticBag()
+    build.edits += apply_patch(build.tree, patch, found)
+    found.raise_errors(library.sources)
+    _check_depth(library, build.tree)
 
-    def _extended(self, root: Node, kind: str, path: Path, chain: tuple[Path, ...]) -> Node:
-        base = self._base(root, "extends", path, chain)
-        entry = root.entry("extends")
-        assert entry is not None, "internal: the key was looked at before"
-        if base.kind != kind:
-            message = f"`{entry.value}` is a file of kind `{base.kind}`, this one is of kind `{kind}`"
-            raise self.library.error("S108", message, entry.value_span())
-        assert isinstance(base.tree.children, dict), "internal: a file is a mapping"
-        assert isinstance(root.children, dict), "internal: a file is a mapping"
-        base.tree.children.pop("abstract", None)
-        del root.children["extends"]
-        merged = merge(base.tree, root)
-        self.check_depth(merged)
-        return merged
 
-    def _kind(self, root: Node) -> str:
-        if not isinstance(root.children, dict):
-            message = f"a scenario file is a mapping of keys; this one is {root.kind}"
-            hint = "it starts with a key such as `scenario: name`"
-            raise self.library.error("S108", message, root.value_span(), hint=hint)
-        kinds = [key for key in root.children if key in KINDS]
-        if len(kinds) == 1:
-            return kinds[0]
-        if kinds:
-            message = f"a file has only one of `{kinds[0]}` and `{kinds[1]}`"
-            raise self.library.error("S107", message, root.children[kinds[1]].key_span())
-        for key, part in root.children.items():
-            near = did_you_mean(key, KINDS)
-            if near:
-                message = f"unknown key `{key}`, and no key says what this file is"
-                raise self.library.error("S108", message, part.key_span(), suggestion=near)
-        hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in KINDS)
-        raise self.library.error("S108", "no key says what this file is", root.value_span(), hint=hint)
+def _check_chain(library: Library, path: Path, chain: tuple[Path, ...], asked: Span) -> None:
+    """Whether `path` may be built on by the files of `chain`.
 
-    def check_depth(self, tree: Node) -> None:
-        """Whether a tree that was put together is shallow enough.
+    Raises:
+        ScenarioError: S506 if it is one of them, S507 if they are too many.
+    """
+    if path in chain:
+        circle = " → ".join(p.name for p in (*chain[chain.index(path) :], path))
+        raise library.error("S506", f"these files build on each other in a circle: {circle}", asked)
+    if len(chain) >= MAX_CHAIN:
+        raise library.error("S507", f"more than {MAX_CHAIN} files build on each other", asked)
 
-        Raises:
-            ScenarioError: S004.
-        """
-        for path, node in tree.walk():
-            if len(path) > MAX_DEPTH:
-                message = f"put together, the scenario is nested more than {MAX_DEPTH} levels deep"
-                raise self.library.error("S004", message, node.value_span())
+
+def _base(library: Library, root: Node, key: str, path: Path, chain: tuple[Path, ...]) -> Build:
+    """What the file named at `key` (`of` or `extends`) is."""
+    entry = root.entry(key)
+    assert entry is not None, "internal: the key was looked at before"
+    span = entry.value_span()
+    if not isinstance(entry.value, str):
+        raise library.error("S104", f"`{key}` names one file, it is not {entry.kind}", span)
+    build = _built(library, library.find(entry.value, path.parent, span), span, (*chain, path))
+    if build.kind == "variant":
+        message = f"`{entry.value}` is a variant of any scenario; nothing can be built on it"
+        raise library.error("S108", message, span)
+    return build
+
+
+def _extended(library: Library, root: Node, kind: str, path: Path, chain: tuple[Path, ...]) -> Node:
+    base = _base(library, root, "extends", path, chain)
+    entry = root.entry("extends")
+    assert entry is not None, "internal: the key was looked at before"
+    if base.kind != kind:
+        message = f"`{entry.value}` is a file of kind `{base.kind}`, this one is of kind `{kind}`"
+        raise library.error("S108", message, entry.value_span())
+    assert isinstance(base.tree.children, dict), "internal: a file is a mapping"
+    assert isinstance(root.children, dict), "internal: a file is a mapping"
+    base.tree.children.pop("abstract", None)
+    del root.children["extends"]
+    merged = merge(base.tree, root)
+    _check_depth(library, merged)
+    return merged
+
+
+def _kind_of(library: Library, root: Node) -> str:
+    if not isinstance(root.children, dict):
+        message = f"a scenario file is a mapping of keys; this one is {root.kind}"
+        hint = "it starts with a key such as `scenario: name`"
+        raise library.error("S108", message, root.value_span(), hint=hint)
+    kinds = [key for key in root.children if key in KINDS]
+    if len(kinds) == 1:
+        return kinds[0]
+    if kinds:
+        message = f"a file has only one of `{kinds[0]}` and `{kinds[1]}`"
+        raise library.error("S107", message, root.children[kinds[1]].key_span())
+    for key, part in root.children.items():
+        near = did_you_mean(key, KINDS)
+        if near:
+            message = f"unknown key `{key}`, and no key says what this file is"
+            raise library.error("S108", message, part.key_span(), suggestion=near)
+    hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in KINDS)
+    raise library.error("S108", "no key says what this file is", root.value_span(), hint=hint)
+
+
+def _check_depth(library: Library, tree: Node) -> None:
+    """Whether a tree that was put together is shallow enough.
+
+    Raises:
+        ScenarioError: S004.
+    """
+    for path, node in tree.walk():
+        if len(path) > MAX_DEPTH:
+            message = f"put together, the scenario is nested more than {MAX_DEPTH} levels deep"
+            raise library.error("S004", message, node.value_span())
 
 
 _OF_ANY: Final = re.compile(r"^of: *any\b", re.MULTILINE)
 
 
-def vary(builder: Builder, build: Build, variant: NamePart) -> None:
+def vary(library: Library, build: Build, variant: NamePart) -> None:
     """Apply a variant to what is built: the nearest file of that name, else one for any scenario.
 
     `<X>_V.yaml` comes first, then `<R>_V.yaml` of each scenario R that X is a variant of, then `V.yaml` with
@@ -358,18 +355,18 @@ def vary(builder: Builder, build: Build, variant: NamePart) -> None:
     """
     if variant.text in build.name.split("+")[1:]:
         return
-    direct = _direct(builder, build, variant)
+    direct = _direct(library, build, variant)
     if direct is not None:
         build.own_variants.append(variant.text)
-        patches = _down_to(builder, build, direct, variant)
+        patches = _down_to(library, build, direct, variant)
         if not patches and build.kind != "suite":
             return
         for patch in patches:
-            builder.patch(build, patch)
+            _apply(library, build, patch)
     if build.kind == "suite":
         build.passed_on.append(variant)
     elif direct is None:
-        builder.patch(build, _of_any(builder, build, variant))
+        _apply(library, build, _of_any(library, build, variant))
     _name(build, variant.text, direct)
 
 
@@ -383,8 +380,7 @@ def _name(build: Build, variant: str, file: Path | None) -> None:
     build.name = f"{build.name}+{variant}"
 
 
-def _direct(builder: Builder, build: Build, variant: NamePart) -> Path | None:
-    library = builder.library
+def _direct(library: Library, build: Build, variant: NamePart) -> Path | None:
     for ancestor in build.lineage:
         for folder in dict.fromkeys((ancestor.folder, library.shipped)):
             path = library.resolved(folder / f"{ancestor.stem}_{variant.text}.yaml", variant.span)
@@ -393,53 +389,53 @@ def _direct(builder: Builder, build: Build, variant: NamePart) -> Path | None:
     return None
 
 
-def _down_to(builder: Builder, build: Build, path: Path, variant: NamePart) -> list[Node]:
+def _down_to(library: Library, build: Build, path: Path, variant: NamePart) -> list[Node]:
     """The patches that lead from what is built to the variant in a file, in the order to apply them."""
     known = {ancestor.path for ancestor in build.lineage}
     patches: list[Node] = []
     seen: tuple[Path, ...] = ()
     asked = variant.span
     while path not in known:
-        builder.check_chain(path, seen, asked)
+        _check_chain(library, path, seen, asked)
         seen = (*seen, path)
-        patch = _variant_file(builder, build, path, variant)
+        patch = _variant_file(library, build, path, variant)
         patches.insert(0, patch)
         base = patch.text("of")
         if base is None or base == ANY:
             break
         asked = patch.value_span(("of",))
-        path = builder.library.find(base, path.parent, asked)
+        path = library.find(base, path.parent, asked)
     return patches
 
 
-def _of_any(builder: Builder, build: Build, variant: NamePart) -> Node:
-    for folder in _folders(builder, build):
-        path = builder.library.resolved(folder / f"{variant.text}.yaml", variant.span)
+def _of_any(library: Library, build: Build, variant: NamePart) -> Node:
+    for folder in _folders(library, build):
+        path = library.resolved(folder / f"{variant.text}.yaml", variant.span)
         if _is_of_any(path):
-            return _variant_file(builder, build, path, variant)
-    known = _known(builder, build)
+            return _variant_file(library, build, path, variant)
+    known = _known(library, build)
     near = did_you_mean(variant.text, known)
     listed = "it has " + ", ".join(f"`{name}`" for name in known) if known else "it has none"
     message = f"`{build.name}` has no variant `{variant.text}`"
-    raise builder.library.error("S503", message, variant.span, None if near else listed, near)
+    raise library.error("S503", message, variant.span, None if near else listed, near)
 
 
-def _variant_file(builder: Builder, build: Build, path: Path, variant: NamePart) -> Node:
-    root, kind = builder.read(path, variant.span)
+def _variant_file(library: Library, build: Build, path: Path, variant: NamePart) -> Node:
+    root, kind = _read(library, path, variant.span)
     if kind != "variant":
         message = f"`{variant.text}` is no variant of `{build.name}`: {display_name(path)} is a {kind}"
-        raise builder.library.error("S503", message, variant.span)
+        raise library.error("S503", message, variant.span)
     return root
 
 
-def _folders(builder: Builder, build: Build) -> list[Path]:
-    return list(dict.fromkeys([*(ancestor.folder for ancestor in build.lineage), builder.library.shipped]))
+def _folders(library: Library, build: Build) -> list[Path]:
+    return list(dict.fromkeys([*(ancestor.folder for ancestor in build.lineage), library.shipped]))
 
 
-def _known(builder: Builder, build: Build) -> list[str]:
+def _known(library: Library, build: Build) -> list[str]:
     """The variants that what is built has, sorted."""
     names: set[str] = set()
-    for folder in _folders(builder, build):
+    for folder in _folders(library, build):
         stems = [name.removesuffix(".yaml") for name in yaml_files(folder) if name.endswith(".yaml")]
         names.update(stem for stem in stems if _is_of_any(folder / f"{stem}.yaml"))
         for ancestor in build.lineage:
@@ -476,21 +472,21 @@ class ResolvedFile:
         edits: what variants changed, in order.
     """
 
-    def __init__(self, builder: Builder, build: Build, given: Mapping[str, NamePart]) -> None:
+    def __init__(self, library: Library, build: Build, given: Mapping[str, NamePart]) -> None:
         self.name = build.name
         self.kind = build.kind
         self.tree = build.tree
         self.data = build.tree.data
         self.params = {key: part.text for key, part in given.items()}
         self.edits = tuple(build.edits)
-        self._builder = builder
+        self._library = library
         self._build = build
         self._given = given
 
     @property
     def files(self) -> dict[str, Source]:
         """Name -> source, for all files read so far for the scenario that was named."""
-        return self._builder.library.sources
+        return self._library.sources
 
     @property
     def path(self) -> Path:
@@ -498,13 +494,8 @@ class ResolvedFile:
         return self._build.path
 
     @property
-    def variants(self) -> tuple[str, ...]:
-        """The variants that a suite passes on to its members."""
-        return tuple(part.text for part in self._build.passed_on)
-
-    @property
     def passed_on(self) -> tuple[NamePart, ...]:
-        """The same, with the places where they are asked for."""
+        """The variants that a suite passes on to its members, with the places where they are asked for."""
         return tuple(self._build.passed_on)
 
     @property
@@ -520,14 +511,14 @@ class ResolvedFile:
         self, code: str, message: str, span: Span, hint: str | None = None, suggestion: str | None = None
     ) -> ScenarioError:
         """The exception for one finding, with the sources read so far."""
-        return self._builder.library.error(code, message, span, hint, suggestion)
+        return self._library.error(code, message, span, hint, suggestion)
 
     def changed(self, *steps: Callable[[Node], None]) -> ResolvedFile:
         """This scenario after steps that change its tree."""
         build = self._build.copy()
         for step in steps:
             step(build.tree)
-        return ResolvedFile(self._builder, build, self._given)
+        return ResolvedFile(self._library, build, self._given)
 
     def param_span(self, name: str) -> Span:
         """Where the parameter was given a value, in the name of the scenario."""
@@ -555,12 +546,11 @@ class ResolvedFile:
 
     def _named(self, text: str, start: Span, folder: Path) -> ResolvedFile:
         """The file of a name that is written in a file."""
-        library = self._builder.library
         found = DiagnosticBag()
         name = parse_name(text, start, found)
-        found.raise_errors(library.sources)
-        file = library.find(name.base.text, folder, name.base.span)
-        return _resolved(self._builder, file, name, name.base.span)
+        found.raise_errors(self.files)
+        file = self._library.find(name.base.text, folder, name.base.span)
+        return _resolved(self._library, file, name, name.base.span)
 
     def include_all(self, path: DataPath) -> tuple[ResolvedFile, ...]:
         """The files that the text or list of texts at `path` names.
@@ -576,9 +566,9 @@ class ResolvedFile:
         if not isinstance(node.value, str) or "*" not in node.value:
             return (self.include(path),)
         span = node.value_span()
-        files = self._builder.library.matching(node.value, _folder(node), span)
+        files = self._library.matching(node.value, _folder(node), span)
         names = [ScenarioName(NamePart(file.name, span), (), {}) for file in files]
-        return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
+        return tuple(_resolved(self._library, f, n, span) for f, n in zip(files, names, strict=True))
 
     def with_drawn_files(self) -> ResolvedFile:
         """This scenario with the npc files that each `one_of` of its cast names put in the place of their names.
@@ -599,8 +589,8 @@ class ResolvedFile:
             place: DataPath = ("cast", name, "one_of")
             node = build.tree.at(place)
             node.value, node.children = None, [file._build.tree for file in self._npc_files(place)]
-        self._builder.check_depth(build.tree)
-        return ResolvedFile(self._builder, build, self._given)
+        _check_depth(self._library, build.tree)
+        return ResolvedFile(self._library, build, self._given)
 
     def _npc_files(self, place: DataPath) -> list[ResolvedFile]:
         """The npc files that are named at `place`; those that others build on are left out of a pattern."""
@@ -614,11 +604,11 @@ class ResolvedFile:
                     message = (
                         f"`{file.path.name}` is a file of the kind `{file.kind}`; only npc files can be drawn"
                     )
-                    raise self._builder.library.error("S108", message, span)
+                    raise self.error("S108", message, span)
                 abstract = isinstance(file.data, dict) and file.data.get("abstract") is True
                 if abstract and len(files) == 1:
                     message = f"`{file.path.name}` is abstract: others build on it, nobody can be it"
-                    raise self._builder.library.error("S108", message, span)
+                    raise self.error("S108", message, span)
                 if not abstract:
                     found.append(file)
         return found
@@ -627,12 +617,12 @@ class ResolvedFile:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
         build = self._build.copy()
         try:
-            vary(self._builder, build, variant)
+            vary(self._library, build, variant)
         except ScenarioError as error:
             if any(d.code != "S503" for d in error.diagnostics):
                 raise
             return None
-        return ResolvedFile(self._builder, build, self._given)
+        return ResolvedFile(self._library, build, self._given)
 
     def patched(self, change: Node) -> ResolvedFile:
         """This scenario changed by a mapping (`remove`, `set`, `add`) of another file.
@@ -643,8 +633,8 @@ class ResolvedFile:
         build, patch = self._build.copy(), change.copy()
         if isinstance(patch.children, dict):
             patch.children = {verb: part for verb, part in patch.children.items() if verb in PATCH_VERBS}
-        self._builder.patch(build, patch)
-        return ResolvedFile(self._builder, build, self._given)
+        _apply(self._library, build, patch)
+        return ResolvedFile(self._library, build, self._given)
 
     def with_value(self, path: str, value: Node) -> ResolvedFile:
         """This scenario with a value of another file set at a path of it.
@@ -658,7 +648,7 @@ class ResolvedFile:
     def with_params(self, values: Mapping[str, tuple[str, Span]]) -> ResolvedFile:
         """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
         given = {name: NamePart(text, span) for name, (text, span) in values.items()}
-        return ResolvedFile(self._builder, self._build.copy(), {**self._given, **given})
+        return ResolvedFile(self._library, self._build.copy(), {**self._given, **given})
 
 
 def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> ResolvedFile:
@@ -682,7 +672,7 @@ def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | 
     path = _named_file(parsed.base, folder, source, texts or {})
     library = Library([path.parent] if base is None else [base, path.parent], texts)
     library.sources[source.name] = source
-    return _resolved(Builder(library), path, parsed)
+    return _resolved(library, path, parsed)
 
 
 def shipped_names() -> list[str]:
@@ -690,14 +680,14 @@ def shipped_names() -> list[str]:
     return names_in(shipped_folder())
 
 
-def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> ResolvedFile:
-    build = builder.built(path, asked)
+def _resolved(library: Library, path: Path, name: ScenarioName, asked: Span | None = None) -> ResolvedFile:
+    build = _built(library, path, asked)
     if len(name.variants) > MAX_CHAIN:
         message = f"at most {MAX_CHAIN} variants can be combined"
-        raise builder.library.error("S507", message, name.variants[-1].span)
+        raise library.error("S507", message, name.variants[-1].span)
     for variant in name.variants:
-        vary(builder, build, variant)
-    return ResolvedFile(builder, build, name.params)
+        vary(library, build, variant)
+    return ResolvedFile(library, build, name.params)
 
 
 def _folder(part: Node) -> Path:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import Source
 
 _TEXT_QUOTES: Final = {"'": "'", '"': '"'}
 _COLON_IN_TEXT: Final = "not YAML: a colon followed by a space starts a new key; quote the text"
@@ -17,8 +17,8 @@ def explain(error: Exception, source: Source) -> Diagnostic:
     """The finding for whatever libyaml or PyYAML raised over this source."""
     problem = str(getattr(error, "problem", None) or "the text cannot be read")
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-    place = _Place(source, mark)
-    context = _Place(source, getattr(error, "context_mark", None) or mark)
+    place = _Place.of(source, mark)
+    context = _Place.of(source, getattr(error, "context_mark", None) or mark)
     for explanation in (_swallowed, _unclosed, _colon, _first_character, _after_quote, _layout):
         found = explanation(problem, place, context)
         if found:
@@ -26,39 +26,40 @@ def explain(error: Exception, source: Source) -> Diagnostic:
     return place.finding(f"not YAML: {problem}")
 
 
+@dataclass(frozen=True)
 class _Place:
     """A mark of the parser, looked at in the text."""
 
-    def __init__(self, source: Source, mark: Any) -> None:
-        self.line_number = int(mark.line) + 1 if mark else 1
-        self.column = int(mark.column) + 1 if mark else 1
-        self._source = source
-        self.line = source.line(self.line_number)
-        self.before = self.line[: self.column - 1]
-        self.character = self.line[self.column - 1 : self.column]
+    source: Source
+    line_number: int = 1
+    column: int = 1
+
+    @classmethod
+    def of(cls, source: Source, mark: Any) -> _Place:
+        """Where a mark is; the beginning if there is none."""
+        return cls(source, int(mark.line) + 1, int(mark.column) + 1) if mark else cls(source)
+
+    @property
+    def line(self) -> str:
+        return self.source.line(self.line_number)
+
+    @property
+    def before(self) -> str:
+        return self.line[: self.column - 1]
+
+    @property
+    def character(self) -> str:
+        return self.line[self.column - 1 : self.column]
 
     @property
     def at_end(self) -> bool:
-        return not self.character and not self._source.line(self.line_number + 1)
-
-    @property
-    def span(self) -> Span:
-        return self._source.span(self.line_number, self.column)
-
-    def lines_to(self, end: _Place) -> Iterator[_Place]:
-        """The lines from this one to that of `end`."""
-        for number in range(self.line_number, end.line_number + 1):
-            place = _Place(self._source, None)
-            place.line_number, place.line = number, self._source.line(number)
-            yield place
+        return not self.character and not self.source.line(self.line_number + 1)
 
     def line_above(self) -> _Place:
         """The first character of the line above."""
-        above = _Place(self._source, None)
-        above.line_number = max(1, self.line_number - 1)
-        above.line = self._source.line(above.line_number)
-        above.column = len(above.line) - len(above.line.lstrip()) + 1
-        return above
+        number = max(1, self.line_number - 1)
+        above = self.source.line(number)
+        return _Place(self.source, number, len(above) - len(above.lstrip()) + 1)
 
     def run_together(self) -> Diagnostic | None:
         """The finding for a `key:value` that starts here, without a space."""
@@ -69,7 +70,7 @@ class _Place:
         return self.finding("not YAML: a space is missing after the colon", hint)
 
     def finding(self, message: str, hint: str | None = None) -> Diagnostic:
-        return Diagnostic("S001", message, self.span, hint=hint)
+        return Diagnostic("S001", message, self.source.span(self.line_number, self.column), hint=hint)
 
 
 def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
@@ -77,12 +78,13 @@ def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | Non
     closing = {"{": "}", "[": "]"}.get(context.character)
     if closing is None:
         return None
-    for line in context.lines_to(place):
-        start = _comment_in(line.line)
-        if start is not None and closing in line.line[start:]:
-            line.column = start + 1
+    for number in range(context.line_number, place.line_number + 1):
+        line = context.source.line(number)
+        start = _comment_in(line)
+        if start is not None and closing in line[start:]:
+            comment = _Place(context.source, number, start + 1)
             message = f"not YAML: a `#` behind a blank begins a comment, which takes the `{closing}` along"
-            return line.finding(message, "quote the text that the `#` belongs to")
+            return comment.finding(message, "quote the text that the `#` belongs to")
     return None
 
 

@@ -46,7 +46,6 @@ from socialai_dsl.program.format import (
     SECRET,
     TEMPORARIES,
     TEMPORARY,
-    TESTS,
     VERSION,
     VIEW,
     Body,
@@ -65,7 +64,7 @@ from socialai_dsl.program.format import (
     place_of,
     unpack_held,
 )
-from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
+from socialai_dsl.program.instructions import CLASS_BITS, TESTS, Op, OpClass
 from socialai_dsl.program.program import (
     EntityName,
     Outcome,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
-
 VERSION = 2
 TEMPORARY = 8192
 TEMPORARIES = 1 << 15
@@ -251,7 +249,6 @@ class Side(IntEnum):
     RIGHT = 3
 
 
-TESTS = frozenset(op for op in Op if op >> CLASS_BITS == OpClass.TEST)
 LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop": 8, "none": 10}
 """Last acts of an NPC in the sixth channel; `point` has the direction added, relative if the picture is egocentric."""
 NO_GESTURE = 255

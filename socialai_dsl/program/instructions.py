@@ -13,9 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from functools import cached_property
+from functools import cached_property, reduce
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final
+
+from socialai_dsl.program.format import CELL, ENTITY_FIELDS, FIRST_ENTITY, MOST_CHOICES
 
 Interval = tuple[int, int]
 
@@ -25,38 +27,43 @@ ANYTHING: Interval = (-(1 << 63), (1 << 63) - 1)
 _BITS_OF_A_SET = 32
 
 
-class Bounds(Protocol):
-    """The bounds that the range of a result may depend on besides its operands."""
+def hull(a: Interval, b: Interval) -> Interval:
+    """The least interval around both."""
+    return min(a[0], b[0]), max(a[1], b[1])
 
-    @property
-    def first_cell(self) -> int:
-        """The first cell as an operand; the number before it is no cell."""
+
+@dataclass(frozen=True)
+class Bounds:
+    """The bounds that the range of a result may depend on besides its operands.
+
+    Attributes:
+        of_register: the range of every register.
+        width, height: of the canvas.
+        npcs: the greatest number of an NPC.
+        nouns: how many nouns there are.
+    """
+
+    of_register: tuple[Interval, ...]
+    width: int
+    height: int
+    npcs: int
+    nouns: int
 
     @property
     def last_cell(self) -> int:
         """The last cell of the canvas as an operand."""
-
-    @property
-    def width(self) -> int:
-        """Columns of the canvas."""
-
-    @property
-    def height(self) -> int:
-        """Lines of the canvas."""
-
-    @property
-    def npcs(self) -> int:
-        """The greatest number of an NPC."""
-
-    @property
-    def nouns(self) -> int:
-        """How many nouns there are."""
+        return CELL + 32 * (self.height - 1) + self.width - 1
 
     def field(self, things: Interval, which: int) -> Interval:
-        """The range of a field over several entities, or over cells."""
+        """The range of a field over several entities, or over cells, whose numbers hold 32 columns."""
+        if things[0] >= CELL - 1:
+            return -1, 31
+        first, last = (FIRST_ENTITY + ENTITY_FIELDS * entity + which for entity in things)
+        return reduce(hull, self.of_register[first : last + 1 : ENTITY_FIELDS])
 
     def row(self, first: int, last: int) -> Interval:
         """The range of all registers from one to another."""
+        return reduce(hull, self.of_register[first : last + 1])
 
 
 Operands = Sequence[Interval]
@@ -66,19 +73,9 @@ Rule = Callable[[Bounds, Operands], Interval]
 """The range of what an instruction writes."""
 
 
-def hull(a: Interval, b: Interval) -> Interval:
-    """The least interval around both."""
-    return min(a[0], b[0]), max(a[1], b[1])
-
-
 def within_64_bits(low: int, high: int) -> Interval:
     """The interval, or everything if it leaves 64 bits."""
     return (low, high) if low >= ANYTHING[0] and high <= ANYTHING[1] else ANYTHING
-
-
-def same(_: Bounds, operands: Operands) -> Interval:
-    """Of LOAD."""
-    return operands[1]
 
 
 def total(_: Bounds, operands: Operands) -> Interval:
@@ -137,38 +134,9 @@ def magnitude(_: Bounds, operands: Operands) -> Interval:
     return within_64_bits(nearest, max(abs(low), abs(high)))
 
 
-def field(bounds: Bounds, operands: Operands) -> Interval:
-    """Of FIELD."""
-    things, which = operands[1:]
-    return bounds.field(things, which[0])
-
-
-def one_of_a_row(bounds: Bounds, operands: Operands) -> Interval:
-    """Of READ_AT, of the registers that it may read."""
-    return bounds.row(operands[1][0] + operands[2][0], operands[1][0] + operands[2][1])
-
-
-def distance(bounds: Bounds, _: Operands) -> Interval:
-    """Of DISTANCE: from cell to cell, or to what is not in the room the sum of its sides.
-
-    The number of a cell holds 32 columns, on however narrow a canvas.
-    """
-    return 0, 32 + bounds.height
-
-
-def one_of_those(_: Bounds, operands: Operands) -> Interval:
-    """Of NEAREST: one of the entities, or -1."""
-    return -1, operands[2][0] & 255
-
-
 def always(low: int, high: int) -> Rule:
     """The same range whatever the operands are."""
     return lambda _, __: (low, high)
-
-
-def drawn(_: Bounds, operands: Operands) -> Interval:
-    """Of DRAW: below a number that is at least 1."""
-    return 0, operands[1][1] - 1
 
 
 def drawn_other(_: Bounds, operands: Operands) -> Interval:
@@ -197,47 +165,7 @@ def a_bit(_: Bounds, operands: Operands) -> Interval:
 
 def a_cell(bounds: Bounds, _: Operands) -> Interval:
     """Of CELL_OF and CELL_BESIDE: a cell, or none."""
-    return bounds.first_cell - 1, bounds.last_cell
-
-
-def a_speaker(bounds: Bounds, _: Operands) -> Interval:
-    """Of HEARD_FROM."""
-    return -1, bounds.npcs
-
-
-def a_noun(bounds: Bounds, _: Operands) -> Interval:
-    """Of HEARD_NOUN."""
-    return -1, bounds.nouns - 1
-
-
-def a_column(bounds: Bounds, _: Operands) -> Interval:
-    """The x of a cell, or -1."""
-    return -1, bounds.width - 1
-
-
-def a_line(bounds: Bounds, _: Operands) -> Interval:
-    """The y of a cell, or -1."""
-    return -1, bounds.height - 1
-
-
-def column_of_loop(bounds: Bounds, _: Operands) -> Interval:
-    """The x of the cell that a loop is at."""
-    return 0, bounds.width - 1
-
-
-def line_of_loop(bounds: Bounds, _: Operands) -> Interval:
-    """The y of the cell that a loop is at."""
-    return 0, bounds.height - 1
-
-
-def cell_of_loop(bounds: Bounds, _: Operands) -> Interval:
-    """The cell that a loop is at."""
-    return bounds.first_cell, bounds.last_cell
-
-
-def how_many_cells(bounds: Bounds, _: Operands) -> Interval:
-    """Of B_COUNT."""
-    return 0, bounds.width * bounds.height
+    return CELL - 1, bounds.last_cell
 
 
 # -- ops and their entries -----------------------------------------------------------------------------------
@@ -353,6 +281,9 @@ class Op(IntEnum):
     DRAW_ROOM = 336
 
 
+TESTS: Final = frozenset(op for op in Op if op >> CLASS_BITS == OpClass.TEST)
+
+
 class Kind(Enum):
     """The kinds of operand words."""
 
@@ -380,9 +311,9 @@ class Operand:
 
     Attributes:
         kind: what the word is.
-        low, high: the range, where it is the same in every program.
+        low, high: the range, as far as it is the same in every program.
         count: of COORDINATES how many temporaries are read.
-        meaning: what a literal means.
+        meaning: what a literal means, or whose number a value is.
     """
 
     kind: Kind
@@ -452,7 +383,9 @@ class Instruction:
 
 _NONE: Final = Operand(Kind.UNUSED)
 _VALUE: Final = Operand(Kind.VALUE)
+_NOT_NEGATIVE: Final = Operand(Kind.VALUE, 0)
 _DIRECTION: Final = Operand(Kind.VALUE, 0, 3)
+_LINE: Final = Operand(Kind.VALUE, 0, meaning="line")
 _ENTITY: Final = Operand(Kind.ENTITY)
 _PLACE: Final = Operand(Kind.PLACE)
 _TARGET: Final = Operand(Kind.TARGET)
@@ -486,7 +419,10 @@ def _plain(
     return Instruction(op, says, (a, b, c), setup=setup)
 
 
-_CELL_FOUND: Final = (a_column, a_line)
+_CELL_FOUND: Final[tuple[Rule, Rule]] = (
+    lambda bounds, _: (-1, bounds.width - 1),
+    lambda bounds, _: (-1, bounds.height - 1),
+)
 
 _ALL: Final = (
     _plain(Op.HALT, "This code ends."),
@@ -496,7 +432,11 @@ _ALL: Final = (
         "Run the c instructions up to END_EACH for each cell of board a, row by row; b, b + 1 and b + 2 are its x, its "
         "y and the cell as an operand.",
         (_BOARD, _WRITTEN_HERE, _SKIP),
-        (column_of_loop, line_of_loop, cell_of_loop),
+        (
+            lambda bounds, _: (0, bounds.width - 1),
+            lambda bounds, _: (0, bounds.height - 1),
+            lambda bounds, _: (CELL, bounds.last_cell),
+        ),
     ),
     _plain(Op.DROP_CELL, "Take the current cell out of the board of the loop."),
     _plain(Op.END_EACH, "The end of a loop."),
@@ -529,7 +469,7 @@ _ALL: Final = (
     _test(Op.IF_REACHES, "a has a path to the cell of b, or next to it."),
     _test(Op.IF_LOOKS_AT, "b lies straight ahead of a, within its view, with nothing opaque between."),
     _test(Op.IF_UNOBSTRUCTED, "Both are in one row or column with nothing opaque between."),
-    _value(Op.LOAD, "a = v(b).", same),
+    _value(Op.LOAD, "a = v(b).", lambda _, operands: operands[1]),
     _value(Op.ADD, "a = v(b) + v(c).", total, c=_VALUE),
     _value(Op.SUB, "a = v(b) - v(c).", difference, c=_VALUE),
     _value(Op.MUL, "a = v(b) * v(c).", product, c=_VALUE),
@@ -541,21 +481,21 @@ _ALL: Final = (
     _value(
         Op.FIELD,
         "a = field c of b; x and y are -1 of what is not in the room.",
-        field,
+        lambda bounds, operands: bounds.field(operands[1], operands[2][0]),
         _PLACE,
-        _literal("field"),
+        _literal("field", 0, ENTITY_FIELDS - 1),
     ),
     _value(
         Op.DISTANCE,
         "a = the Manhattan distance of b and c; width and height together if one is not in the room.",
-        distance,
+        lambda bounds, _: (0, 32 + bounds.height),  # the number of a cell holds 32 columns, on any canvas
         _PLACE,
         _PLACE,
     ),
     _value(
         Op.NEAREST,
         "a = the entity nearest to b of those from c >> 8 to c & 255, ties: the first; -1 if none is in the room.",
-        one_of_those,
+        lambda _, operands: (-1, operands[2][0] & 255),
         _PLACE,
         _literal("first and last entity"),
     ),
@@ -569,7 +509,7 @@ _ALL: Final = (
     _value(
         Op.DRAW,
         "a = a uniform number below v(b), drawn at site c.",
-        drawn,
+        lambda _, operands: (0, operands[1][1] - 1),
         Operand(Kind.VALUE, 1, 1 << 30),
         _SITE,
     ),
@@ -588,12 +528,18 @@ _ALL: Final = (
         a=Operand(Kind.UPDATED, 0),
     ),
     _value(Op.COUNT_BITS, "a = how many of the lower 32 bits of v(b) are set.", bits_set),
-    _value(Op.LOWEST_BIT, "a = the position of the lowest set bit of v(b), of 32; 0 if none.", a_bit),
+    _value(
+        Op.LOWEST_BIT,
+        "a = the position of the lowest set bit of v(b), of 32; 0 if none.",
+        a_bit,
+        _NOT_NEGATIVE,
+    ),
     _value(
         Op.PICK_BIT,
         "a = the position of a uniformly drawn set bit of v(b), of 32, at site c; 0 if none.",
         a_bit,
-        c=_SITE,
+        _NOT_NEGATIVE,
+        _SITE,
     ),
     _value(
         Op.SEES,
@@ -614,29 +560,35 @@ _ALL: Final = (
     _value(
         Op.HEARD_FROM,
         "a = who said the first entry of inbox b whose class is in class set c; -1 if there is none.",
-        a_speaker,
+        lambda bounds, _: (-1, bounds.npcs),
         _INBOX,
         _literal("class set"),
     ),
     _value(
         Op.HEARD_NOUN,
         "a = the noun of the first entry of inbox b whose class is in class set c; -1 if there is none.",
-        a_noun,
+        lambda bounds, _: (-1, bounds.nouns - 1),
         _INBOX,
         _literal("class set"),
     ),
-    _value(Op.READ_AT, "a = register b + v(c).", one_of_a_row, _REGISTER, _VALUE),
+    _value(
+        Op.READ_AT,
+        "a = register b + v(c).",
+        lambda bounds, operands: bounds.row(operands[1][0] + operands[2][0], operands[1][0] + operands[2][1]),
+        _REGISTER,
+        _VALUE,
+    ),
     _plain(
         Op.SET_FIELD,
         "Field b of a = v(c); x, y, status and gone have ops of their own.",
         _ENTITY,
-        _literal("field"),
+        _literal("field", 0, ENTITY_FIELDS - 1),
         _VALUE,
     ),
     _plain(Op.BECOME, "The status of a = v(b); its cell is drawn anew.", _ENTITY, _VALUE),
     _plain(Op.VANISH, "a leaves the room.", _ENTITY),
     _plain(
-        Op.SAY, "a says line v(b) at the end of its turn, unless it says something already.", _ENTITY, _VALUE
+        Op.SAY, "a says line v(b) at the end of its turn, unless it says something already.", _ENTITY, _LINE
     ),
     _plain(Op.GOTO, "Frame a enters state b, clock 0.", _literal("frame"), _literal("state")),
     _plain(Op.COUNT, "Counter a += 1.", _literal("rule")),
@@ -662,7 +614,7 @@ _ALL: Final = (
         Op.ANSWER,
         "Counter a += 1, line v(b) is said as by SAY, and, unless c is 0, frame c >> 8 enters state (c & 255) - 1.",
         _literal("rule"),
-        _VALUE,
+        _LINE,
         _literal("goal"),
     ),
     _plain(Op.STORE_AT, "Register b + v(c) = v(a).", _VALUE, _REGISTER, _VALUE),
@@ -684,8 +636,8 @@ _ALL: Final = (
     _plain(
         Op.CHOOSE,
         "One of b body actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a.",
-        _literal("actions"),
-        _literal("how many"),
+        _literal("actions", 0, (1 << 4 * MOST_CHOICES) - 1),
+        _literal("how many", 1, MOST_CHOICES),
         _SITE,
     ),
     _plain(
@@ -730,7 +682,7 @@ _ALL: Final = (
         Op.B_COUNT,
         "a = how many cells board b has.",
         (_WRITTEN_HERE, _BOARD, _NONE),
-        (how_many_cells,),
+        (lambda bounds, _: (0, bounds.width * bounds.height),),
     ),
     Instruction(
         Op.PICK_CELL,

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from socialai_dsl.program.format import (
     GESTURES,
     LOOKS,
     TEMPORARY,
+    Body,
     EntityColumn,
     Field,
     Flag,
@@ -28,22 +30,17 @@ from socialai_dsl.program.format import (
     Register,
     TypeColumn,
 )
-from socialai_dsl.program.instructions import TABLE, Kind, Op
+from socialai_dsl.program.instructions import TABLE, Bounds, Interval, Kind, Op
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS, NOUN, Sentences
 
 _AS_WRITTEN = frozenset((Kind.LITERAL, Kind.SITE, Kind.BOARD, Kind.FILLED, Kind.CHANGED))
 """Operands whose word is shown as it is."""
 
-_ENTRIES = {
-    Header.RESET_PC: "reset",
-    Header.REQUIRE_PC: "require",
-    Header.BEFORE_PC: "before",
-    Header.LINKS_PC: "links",
-    Header.SETTLE_PC: "settle",
-    Header.RULES_PC: "rules",
-    Header.TICK_PC: "tick",
-}
+_ENTRIES = ("reset", "require", "before", "links", "settle", "rules", "tick")
+
+
+WHOLE_REGISTER: Final[Interval] = (-32768, 32767)
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +224,64 @@ class Program:
         return "\n".join([*_head(self), "", *_code(self), "", *_tables(self)]) + "\n"
 
 
+# -- the range of every register: writes are proven to keep it, and a snapshot must lie within it ---------------
+
+
+def bounds_of(program: Program) -> Bounds:
+    """Bounds that follow from the header, the entities and the names of the program's own registers."""
+    h = program.header
+    ranges = [WHOLE_REGISTER] * h(Header.REGISTERS)
+    for register, interval in _common(program).items():
+        ranges[register] = interval
+    for entity in range(h(Header.ENTITIES)):
+        for which, interval in _fields(program, entity).items():
+            ranges[FIRST_ENTITY + ENTITY_FIELDS * entity + which] = interval
+    for name in program.registers:
+        ranges[name.register] = name.low, name.high
+    return Bounds(
+        tuple(ranges), h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT), h(Header.NPCS), h(Header.NOUNS)
+    )
+
+
+def _common(program: Program) -> dict[Register, Interval]:
+    """Of the registers that code may read."""
+    h = program.header
+    return {
+        Register.T: (0, h(Header.HORIZON)),
+        Register.WIDTH: (h(Header.MIN_WIDTH), h(Header.CANVAS_WIDTH)),
+        Register.HEIGHT: (h(Header.MIN_HEIGHT), h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1),
+        Register.ACTION: (0, Body.NONE),
+        Register.LAST_TURN: (-1, Body.STOP_POINTING),
+        Register.CLASS: (0, h(Header.CLASSES) - 1),
+        Register.TEMPLATE: (-1, h(Header.TEMPLATES) - 1),
+        Register.NOUN: (-1, h(Header.NOUNS) - 1),
+        Register.UTTERANCE: (0, h(Header.TEMPLATES) * h(Header.NOUNS)),
+        Register.CHANGED: (0, 1),
+        Register.ACCEPTED: (0, 1),
+        Register.POKED: (-1, h(Header.ENTITIES) - 1),
+    }
+
+
+def _fields(program: Program, number: int) -> dict[Field, Interval]:
+    h, entity = program.header, program.entities[number]
+    is_object = entity.role == "object"
+    kind = int(program.table(Header.ENTITY_AT)[number, EntityColumn.KIND])
+    return {
+        Field.X: (-1, h(Header.CANVAS_WIDTH) - 1),
+        Field.Y: (-1, h(Header.CANVAS_HEIGHT) - 1),
+        Field.DIR: (0, 3),
+        Field.COLOR: (0, 5),
+        # The status of an NPC is its code in the picture, that of the agent is 0.
+        Field.STATUS: (0, max(1, len(entity.states)) - 1 if is_object else kind),
+        Field.GONE: (0, 1),
+        Field.POKED: (0, 1),
+        Field.LAST: (0, Body.STOP_POINTING),
+        # Of an object who carries it, of an NPC perhaps a cell.
+        Field.POINTING: (0, 1 + h(Header.NPCS) if is_object else CELL + 32 * h(Header.CANVAS_HEIGHT) - 1),
+        Field.INSIDE: (0, h(Header.ENTITIES) - 1),
+    }
+
+
 # -- as text ----------------------------------------------------------------------------------------------------
 
 
@@ -237,7 +292,7 @@ def _head(program: Program) -> list[str]:
         f"  {h(Header.SIZE)} words, {h(Header.REGISTERS)} registers, {h(Header.INSTRUCTIONS)} instructions, "
         f"{h(Header.CLASSES)} utterance classes, {h(Header.LINES)} lines, history of {h(Header.TOKENS)} tokens",
         f"  canvas {h(Header.CANVAS_WIDTH)}x{h(Header.CANVAS_HEIGHT)}, horizon {h(Header.HORIZON)}",
-        "  " + ", ".join(f"{name} at {h(word)}" for word, name in _ENTRIES.items() if h(word)),
+        "  " + ", ".join(f"{name} at {pc}" for name in _ENTRIES if (pc := h(Header[f"{name.upper()}_PC"]))),
     ]
 
 
@@ -248,13 +303,9 @@ def _code(program: Program) -> list[str]:
         if pc in program.labels:
             rows += ["", f"{program.labels[pc]}:"]
         text = f"{pc:5d}  {Op(op).name:<16}{names.operands(Op(op), pc, operands)}"
-        place = f"{_short(span.file)}:{span.line}" if span else ""
+        place = f"{span.file.rsplit('/', 1)[-1]}:{span.line}" if span else ""
         rows.append(f"{text:<66}  {place}".rstrip())
     return rows
-
-
-def _short(file: str) -> str:
-    return file.rsplit("/", 1)[-1]
 
 
 def _tables(program: Program) -> list[str]:
@@ -326,7 +377,8 @@ class _Names:
             case "outcome":
                 return self.program.outcomes[word]
             case "goal":
-                return _goal(word)
+                # Frame and state, as a GOTO shows them.
+                return f"{word >> 8}, {(word & 255) - 1}" if word else "0"
             case "field":
                 return Field(word).name.lower()
             case "first and last entity":
@@ -350,8 +402,3 @@ class _Names:
         if number < CELL:
             return str(self.program.entities[number])
         return f"({(number - CELL) % 32}, {(number - CELL) // 32})"
-
-
-def _goal(word: int) -> str:
-    """Where an answer goes: frame and state, as a GOTO shows them."""
-    return f"{word >> 8}, {(word & 255) - 1}" if word else "0"

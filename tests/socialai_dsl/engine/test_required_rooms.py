@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,7 +125,9 @@ NEVER = drawn(1000, 1000, horizon=2)
 
 def test_a_room_that_never_fits_is_reported_and_left_sound() -> None:
     rows = 200
-    batch = Batch([part_of(NEVER, name="picky"), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8)
+    batch = Batch(
+        [part_of(replace(NEVER, name="picky")), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8
+    )
     batch.state.keys[:, Key.SEED] = 7
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     with pytest.raises(
@@ -143,7 +147,7 @@ def test_a_reset_within_a_step_reports_it_too(task: Task) -> None:
     parts = [part_of(NEVER), part_of(drawn(9, 0, horizon=9))]
     batch = Batch(parts, [[0], [1]], [1, 0], 8)
     batch.state.keys[:, Key.INDEX] = np.arange(2)
-    with pytest.raises(RuntimeError, match="program 0: none of"):
+    with pytest.raises(RuntimeError, match="assembled: none of"):
         batch.reset()
     batch.ports.actions[:] = (7, 0, 0, 0)
     assert batch.step(task) == 0
@@ -166,7 +170,7 @@ def test_pins_hold_in_every_attempt() -> None:
         if accepted:
             batch.reset(pins)
         else:
-            with pytest.raises(RuntimeError, match="program 0"):
+            with pytest.raises(RuntimeError, match="assembled"):
                 batch.reset(pins)
         assert batch.state.registers[0, OWN] == value
 
@@ -198,7 +202,7 @@ def test_a_moment_of_an_episode_is_not_asked_for_its_room() -> None:
     batch.reset(pins)
     assert batch.state.registers[0, [OWN, Register.T, Register.ATTEMPT]].tolist() == [10, 3, 0]
     pins[1, Register.T] = 0
-    with pytest.raises(RuntimeError, match="program 0"):
+    with pytest.raises(RuntimeError, match="assembled"):
         batch.reset(pins)
 
 

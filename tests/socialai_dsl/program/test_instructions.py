@@ -11,7 +11,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.compiler.assembler import Block
-from socialai_dsl.compiler.instruction_checks import PathFacts, Ranges, problem_of
+from socialai_dsl.compiler.instruction_checks import PathFacts, problem_of
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
@@ -29,8 +29,9 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
-from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand
+from socialai_dsl.program.instructions import ANYTHING, TABLE, Bounds, Instruction, Interval, Kind, Operand
 from socialai_dsl.program.instructions_page import instructions_page
+from socialai_dsl.program.program import bounds_of
 
 DOCS = Path(__file__).parents[3] / "docs"
 TOWN = Path(__file__).parents[2] / "diagnostics" / "town.yaml"
@@ -102,7 +103,7 @@ def lonely(town: Program) -> Table:
 class Trial:
     """One instruction with random operands, run from a random state."""
 
-    def __init__(self, town: Program, ranges: Ranges, table: Table, entry: Instruction, seed: int) -> None:
+    def __init__(self, town: Program, ranges: Bounds, table: Table, entry: Instruction, seed: int) -> None:
         self.random = random.Random(seed)
         self.town, self.table, self.entry = town, table, entry
         self.ranges = ranges
@@ -228,7 +229,7 @@ class Trial:
     [TRIALS, pytest.param(5 * TRIALS, marks=pytest.mark.thorough("tries every instruction often"))],
 )
 def test_what_the_verifier_knows_is_so(op: Op, trials: int, town: Program, lonely: Table) -> None:
-    tried, ranges = 0, Ranges.of(town)
+    tried, ranges = 0, bounds_of(town)
     for seed in range(20 * trials):
         trial = Trial(town, ranges, lonely, TABLE[op], seed)
         if trial.is_fine():
