@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import os
 import random
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.fuzzing.targets import in_time
+from tests.slips import write_mistakes
 
 ROOT = Path(__file__).parents[1]
 SMALL = (ROOT / "tests" / "diagnostics" / "small.yaml").read_text(encoding="utf-8")
@@ -411,15 +413,14 @@ def test_crowded_rooms_are_refused_or_drawn(count: int, tmp_path: Path) -> None:
 # -- no code from data ---------------------------------------------------------------------------------------------
 
 
-def test_reading_a_hundred_files_executes_nothing() -> None:
+def test_reading_a_hundred_files_executes_nothing(tmp_path: Path) -> None:
     """In a process of its own, where everything that is imported late has been before."""
+    write_mistakes(tmp_path)
     program = """
 import sys
 from pathlib import Path
 from socialai_dsl.frontend import check
-from tests.fuzzing.playground import DIAGNOSTICS, listening
-import os
-os.chdir(DIAGNOSTICS)
+from tests.fuzzing.playground import listening
 files = sorted(Path(".").glob("[0-9]*.yaml"))
 for name in (*files[::16], "rich.yaml", "town.yaml", "social_env"):
     check(name)
@@ -428,8 +429,9 @@ with listening() as ear:
         check(file)
 print(len(files[::4]), sorted(set(ear.executed)))
 """
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", program], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
     )
     assert done.stderr == ""
     count, _, events = done.stdout.strip().partition(" ")

@@ -1,7 +1,6 @@
 """Mistakes of authors: each has a file here and, beside it, what is said of it; each code has its page in the docs.
 
-Most are slips in a file in which nothing is wrong. `shop.slips` tells those in `shop.yaml`, each under its name: lines
-that are there, of which those behind a minus sign go, and behind plus signs the lines that come after them.
+Most are slips in a right file; see `tests/slips.py`.
 """
 
 from __future__ import annotations
@@ -19,33 +18,11 @@ from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.diagnostics import CODES, render_text
 from socialai_dsl.frontend import CheckResult, check
+from tests.slips import SLIPS, write_mistakes
 
 FOLDER = Path(__file__).parent
 
 
-def slips() -> dict[str, str]:
-    """The name and the text of each file that slips make."""
-    found = {}
-    for file in FOLDER.glob("*.slips"):
-        right = file.with_suffix(".yaml").read_text(encoding="utf-8")
-        for slip in file.read_text(encoding="utf-8").split("\n\n"):
-            name, _, changes = slip.partition(":\n")
-            found[name] = slipped(right, changes)
-    return found
-
-
-def slipped(text: str, changes: str) -> str:
-    """The text after some changes, each of which is about lines that are there once."""
-    for change in re.findall(r"(?:[ -].*\n)+(?:\+.*\n)*", f"{changes}\n"):
-        lines = [(line[0], line[1:]) for line in change.splitlines(keepends=True)]
-        before = "".join(line for mark, line in lines if mark != "+")
-        after = "".join(line for mark, line in lines if mark != "-")
-        assert f"\n{text}".count(f"\n{before}") == 1, before
-        text = f"\n{text}".replace(f"\n{before}", f"\n{after}")[1:]
-    return text
-
-
-SLIPS = slips()
 CASES = sorted([*(path.stem for path in FOLDER.glob("[0-9]*.yaml")), *SLIPS])
 ONE_SLIP = ("75", "76", "77", "78", "80", "81", "82", "83")
 """How the numbers of files begin in which an author made one slip: it is one finding."""
@@ -62,11 +39,7 @@ NOT_FROM_ONE_FILE = {
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with all files, those that slips make among them."""
     folder = tmp_path_factory.mktemp("diagnostics")
-    shutil.copytree(
-        FOLDER, folder, ignore=shutil.ignore_patterns("*.out", "*.py", "*.slips"), dirs_exist_ok=True
-    )
-    for name, text in SLIPS.items():
-        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    write_mistakes(folder)
     return folder
 
 

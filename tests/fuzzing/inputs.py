@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from tests.fuzzing.playground import DIAGNOSTICS, ROOT
+from tests.slips import SLIPS
 
 WORDS = (
     *("scenario: ", "variant: ", "suite: ", "npc: ", "library: ", "extends: ", "of: ", "one_of: ", "members: "),
@@ -48,7 +49,7 @@ def seeds(target: str) -> list[bytes]:
     if target == "expression":
         return [text.encode() for text in EXPRESSIONS]
     files = [*sorted(DIAGNOSTICS.glob("*.yaml")), *sorted((ROOT / "scenarios").rglob("*.yaml"))]
-    return [path.read_bytes() for path in files]
+    return [*(text.encode() for text in SLIPS.values()), *(path.read_bytes() for path in files)]
 
 
 def write_corpus(folder: Path, target: str) -> None:
