@@ -243,7 +243,7 @@ def _pairs(program: Program, checked: CheckedScenario, rooms: int, seed: int) ->
 def _other(
     part: _Part, table: Table, drawn: Mapping[int, dict[str, Any]], k: int, rooms: int, seed: int
 ) -> dict[str, Any] | None:
-    """Another value that a part of room k, of so many, can have; None if none was found."""
+    """Another value of a part of room k, as one of the `rooms` has it or as drawn anew; None if none was found."""
     own = part.value(drawn[k])
     for attempt in range(1, _ATTEMPTS + 1):
         room = (

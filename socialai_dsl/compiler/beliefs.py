@@ -28,10 +28,7 @@ def _perceive_one(to: Expressions, sources: Iterator[BeliefPlan]) -> None:
         with block.scratch():
             if belief.when is not None:
                 to.sited_condition(belief.when, unseen)
-            to.failed = unseen
-            value = to.sited_copy(belief.value)
-            to.failed = None
-            to.store(belief.path, value)
+            to.note_value(belief.path, belief.value, unseen)
             if age is not None:
                 block.emit(Op.LOAD, age, constant(0))
             if forgets or belief is not listed[-1]:

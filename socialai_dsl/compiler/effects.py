@@ -377,10 +377,7 @@ def _remember(to: Expressions, item: Drawn) -> None:
             # `accepts` reads the condition alone, without `found`.
             if item.type.kind == "bool":
                 block.emit(Op.LOAD, to.registers.by_path[item.path], constant(0))
-            to.failed = missing
-        value = to.sited_copy(item.value)
-        to.failed = None
-        to.store(item.path, value)
+        to.note_value(item.path, item.value, missing if found is not None else None)
         if found is not None:
             block.emit(Op.LOAD, found, constant(1))
         block.bind(missing)

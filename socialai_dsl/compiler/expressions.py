@@ -384,6 +384,13 @@ class Expressions(Emitter):
         self.block.emit(Op.LOAD, register, constant(1))
         self.block.bind(false)
 
+    def note_value(self, path: str, value: terms.SitedTerm, nothing: Label | None) -> None:
+        """Put a value into a register; skip to `nothing` if it finds nothing (None: it always finds something)."""
+        self.failed = nothing
+        found = self.sited_copy(value)
+        self.failed = None
+        self.store(path, found)
+
     def _truth_value(self, term: Term) -> int:
         result = self.block.temporary()
         false = Label()

@@ -94,6 +94,4 @@ def _note(to: Expressions, value: Drawn, nothing: Label) -> None:
         if value.type.kind == "bool":
             to.note_whether(register, value.value)
         else:
-            to.failed = nothing
-            to.store(value.path, to.sited_copy(value.value))
-            to.failed = None
+            to.note_value(value.path, value.value, nothing)
