@@ -131,7 +131,7 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
     from socialai_dsl.evaluation.players import MODEL_PREFIX, Player, folder_of, named_agent
-    from socialai_dsl.evaluation.scripts import scripted_name
+    from socialai_dsl.evaluation.scripts import script_of
     from socialai_dsl.evaluation.testing import evaluate_agent, evaluation_of_model, own_scenario
 
     source = arguments.source
@@ -147,6 +147,6 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
             return evaluation_of_model(folder, played_by, scenario, episodes)
     else:
         scenario = source
-        usual = "oracle" if scripted_name(scenario) is not None else "random"
+        usual = "oracle" if script_of(scenario) is not None else "random"
         agent = named_agent(arguments.agent or usual, scenario)
     return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)

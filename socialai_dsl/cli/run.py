@@ -48,8 +48,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.evaluation.players import require_trainer
 
     require_trainer()
-    config = resumed(arguments) if arguments.resume else started(arguments)
-    loaded = socialai_dsl.load(config.scenario)
+    if arguments.resume:
+        config = resumed(arguments)
+        loaded = socialai_dsl.load(config.scenario)
+    else:
+        config, loaded = started(arguments)
     program = compiled(loaded)
     folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
     with only_writer(folder):
@@ -62,7 +65,7 @@ def _run(
     """Train if the agent is to be trained, evaluate, write everything down."""
     from socialai_dsl.cli.training import draw_curve, record_run, train_in, training_figures, write_card
     from socialai_dsl.evaluation.players import Player
-    from socialai_dsl.evaluation.testing import evaluate_agent
+    from socialai_dsl.evaluation.testing import play_test_set
 
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
@@ -75,7 +78,7 @@ def _run(
     # What is trained differs by its training; what is not, by what it draws.
     drawn = 0 if config.trains else config.seed
     player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder)
-    evaluation = evaluate_agent(player, config.scenario, config.eval_episodes)
+    evaluation = play_test_set(player, config.scenario, loaded, program, config.eval_episodes)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     result = {

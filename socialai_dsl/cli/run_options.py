@@ -9,6 +9,7 @@ from typing import Any, Final, get_args
 
 from pydantic import ValidationError
 
+from socialai_dsl.checking.loaded import Loaded, guided_options
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.settings import resolved_config
@@ -88,8 +89,8 @@ def _whole_number(text: str) -> int:
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
 
-def started(arguments: argparse.Namespace) -> RunConfig:
-    """The configuration of a new run."""
+def started(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
+    """The configuration of a new run, and its scenario."""
     if arguments.scenario is None:
         raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
     from socialai_dsl.evaluation.players import folder_of, named_agent
@@ -127,12 +128,13 @@ def resumed(arguments: argparse.Namespace) -> RunConfig:
     return resumed
 
 
-def new_config(arguments: argparse.Namespace) -> RunConfig:
-    """The configuration of a new run, with everything resolved.
+def new_config(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
+    """The configuration of a new run with everything resolved, and its scenario.
 
     Raises:
         UsageError: an option is unknown or out of bounds, or options contradict each other.
     """
+    import socialai_dsl
     from socialai_dsl.evaluation.players import resolve_device
 
     given = {name: getattr(arguments, name) for name in FLAGS if getattr(arguments, name) is not None}
@@ -142,13 +144,14 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
         _refuse_training_options(given, arguments)
     given["device"] = resolve_device(given.get("device", "auto"))
     given["scenario"] = arguments.scenario
+    loaded = socialai_dsl.load(arguments.scenario)
     if not trains:
-        return checked_config(given | {"frames": 0})
+        return checked_config(given | {"frames": 0}), loaded
     given.setdefault("threads", automatic_threads())
-    recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
+    recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario, loaded)
     if given.get("net") not in NET_PRESETS:
-        given = usual_for(recipe, arguments.scenario) | given
-    return checked_config({"recipe": recipe} | given | hyper)
+        given = usual_for(recipe, loaded) | given
+    return checked_config({"recipe": recipe} | given | hyper), loaded
 
 
 def checked_config(given: dict[str, Any]) -> RunConfig:
@@ -214,20 +217,17 @@ def automatic_threads() -> int:
     return max(1, min(cores, _MOST_THREADS))
 
 
-def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
+def _usual_recipe(given: dict[str, Any], scenario: str, loaded: Loaded) -> str:
     """`guided` where the scenario has a script and nothing is asked for that excludes a guide, else `plain`."""
     if given.get("net") in NET_PRESETS or given.get("update") == "chunks":
         return "paper"
     if given.get("guide", "script") != "script" or given.get("curriculum", "none") not in ("none", "even"):
         return "plain"
-    from socialai_dsl.evaluation.scripts import scripted_name
+    from socialai_dsl.evaluation.scripts import script_of
 
-    return "guided" if scripted_name(scenario) is not None else "plain"
+    return "guided" if script_of(scenario, loaded) is not None else "plain"
 
 
-def usual_for(recipe: str, scenario: str) -> dict[str, Any]:
+def usual_for(recipe: str, loaded: Loaded) -> dict[str, Any]:
     """Defaults that depend on the recipe and the scenario."""
-    import socialai_dsl
-    from socialai_dsl.checking.loaded import guided_options
-
-    return guided_options(socialai_dsl.load(scenario)) if recipe == "guided" else {"frames": PLAIN_FRAMES}
+    return guided_options(loaded) if recipe == "guided" else {"frames": PLAIN_FRAMES}

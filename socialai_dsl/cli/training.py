@@ -11,9 +11,10 @@ import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.cli.learnt import Learnt
 from socialai_dsl.cli.progress import TrainingProgress
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.evaluation.model_card import FILE, model_card
-from socialai_dsl.evaluation.scripts import scripted_name, with_script
+from socialai_dsl.evaluation.scripts import script_of, with_script
 from socialai_dsl.evaluation.testing import Evaluation
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import endings_of
@@ -84,8 +85,8 @@ def train_agent(
     from trainer.errors import TrainingStopped
     from trainer.ppo import train
 
-    played = _played(config)
-    scenario = program if played == config.scenario else played
+    played = _played(config, loaded)
+    scenario = program if played is loaded else compiled(played)
     envs = socialai_dsl.make_vec(scenario, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
@@ -112,13 +113,14 @@ def train_agent(
         envs.close()
 
 
-def _played(config: RunConfig) -> str:
+def _played(config: RunConfig, loaded: Loaded) -> Loaded:
     """What is played while training: where a guide leads, the variant with the script that it may follow."""
     if config.guide == "none":
-        return config.scenario
+        return loaded
     if config.guide == "script":
-        return with_script(config.scenario)
-    return scripted_name(config.scenario) or config.scenario
+        return with_script(config.scenario, loaded).loaded
+    scripted = script_of(config.scenario, loaded)
+    return loaded if scripted is None else scripted.loaded
 
 
 def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:

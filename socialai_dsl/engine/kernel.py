@@ -155,48 +155,44 @@ def serve(book: Any, task: int, rows: int) -> int:
     Returns:
         How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
-    return _serve(bare(book), task, rows)
-
-
-@inline
-def _serve(book: Any, task: int, rows: int) -> int:
+    arrays = bare(book)
     ended = 0
-    if task != Task.RESET and not _actions_fit(book, rows):
+    if task != Task.RESET and not _actions_fit(arrays, rows):
         return BAD_ACTION
     for row in range(rows):
         layout = ZERO
         t = ZERO
         if task == Task.RESET:
-            if bytes_of(book, Book.CHOSEN, ZERO)[row] == 0:
+            if bytes_of(arrays, Book.CHOSEN, ZERO)[row] == 0:
                 continue
-            layout = int32_of(book, Book.LAYOUT, ZERO)[row]
+            layout = int32_of(arrays, Book.LAYOUT, ZERO)[row]
         else:
-            _report_nothing(book, row)
-            if int16_of(book, Book.REGISTERS, row)[Register.ENDED] == 0:
-                opened = open_row(book, ZERO, row)
-                reward = step_row(opened, opened.program[Header.SIZE], book, row)
+            _report_nothing(arrays, row)
+            if int16_of(arrays, Book.REGISTERS, row)[Register.ENDED] == 0:
+                opened = open_row(arrays, ZERO, row)
+                reward = step_row(opened, opened.program[Header.SIZE], arrays, row)
                 if reward != 0.0 and _plays_acts(opened.key):
                     reward /= np.float64(_pool_size(opened.key))
-                float64_of(book, Book.REWARD, ZERO)[row] = reward
+                float64_of(arrays, Book.REWARD, ZERO)[row] = reward
                 if opened.registers[Register.ENDED] == 0:
                     continue
                 if _plays_acts(opened.key):
-                    t = _open_act(book, opened)
+                    t = _open_act(arrays, opened)
                 if t == 0:
                     ended += 1
-                    _report_end(book, row, opened)
+                    _report_end(arrays, row, opened)
                     if task != Task.STEP_SAME:
                         continue
-                    _keep_final(book, row)
+                    _keep_final(arrays, row)
             elif task != Task.STEP_NEXT:
                 continue
             if t == 0:
-                uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
+                uint64_of(arrays, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
         if t == 0:
-            _open_episode(book, layout, row)
-        fresh = open_row(book, layout, row)
+            _open_episode(arrays, layout, row)
+        fresh = open_row(arrays, layout, row)
         if not reset_row(fresh, layout != 0, t):
-            bytes_of(book, Book.REFUSED, ZERO)[row] = 1
+            bytes_of(arrays, Book.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM
-        take_picture(fresh, fresh.program[Header.SIZE], book, row)
+        take_picture(fresh, fresh.program[Header.SIZE], arrays, row)
     return ended

@@ -17,7 +17,7 @@ from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
-from socialai_dsl.evaluation.scripts import scripted_name, with_script
+from socialai_dsl.evaluation.scripts import script_of, with_script
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")
@@ -68,9 +68,9 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
         if agent != "oracle":
             yield agent, scenario
         elif agents:
-            yield agent, with_script(scenario)
-        elif (scripted := scripted_name(scenario)) is not None:
-            yield agent, scripted
+            yield agent, with_script(scenario).name
+        elif (scripted := script_of(scenario)) is not None:
+            yield agent, scripted.name
 
 
 def _parts(scenario: str) -> list[TallyItem]:

@@ -155,7 +155,7 @@ class EpisodeTracer:
         self._asked, self._lines, self._seed = scenario, lines, seed
         if lines is None and agent in (None, "oracle"):
             try:
-                scenario = with_script(scenario)
+                scenario = with_script(scenario).name
                 self.agent = "oracle"
             except UsageError:
                 if agent is not None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import socialai_dsl
 from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.analysis.search import Finding, search_rooms
-from socialai_dsl.checking.loaded import unscripted
+from socialai_dsl.checking.loaded import Loaded, unscripted
 from socialai_dsl.errors import UsageError
 
 _TOGETHER: Final = 250
@@ -25,44 +25,54 @@ VERDICTS: Final = {
 """What may be found of a room that the script does not solve -> the same in words."""
 
 
-def scripted_name(scenario: str) -> str | None:
+class Scripted(NamedTuple):
+    """A scenario in which the agent follows a frame; `loaded` is what `load(name)` returns."""
+
+    name: str
+    loaded: Loaded
+
+
+def script_of(scenario: str, loaded: Loaded | None = None) -> Scripted | None:
     """The scenario itself if it scripts the agent, else its variant `oracle`; None if there is no script.
+
+    Args:
+        scenario: a path or a name.
+        loaded: the same, where it is loaded already.
 
     Raises:
         ScenarioError: the scenario, or its variant, has mistakes.
     """
-    name, lacking = _closest_script(scenario)
-    return None if lacking else name
+    closest = _closest_script(scenario, loaded)
+    return None if unscripted(closest.loaded) else closest
 
 
-def with_script(scenario: str) -> str:
-    """`scripted_name`, which there must be.
+def with_script(scenario: str, loaded: Loaded | None = None) -> Scripted:
+    """`script_of`, which there must be.
 
     Raises:
         UsageError: there is no script.
     """
-    name, lacking = _closest_script(scenario)
-    if lacking:
+    closest = _closest_script(scenario, loaded)
+    if lacking := unscripted(closest.loaded):
         raise UsageError(
             f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
         )
-    return name
+    return closest
 
 
-def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
-    """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
-    lacking = unscripted(socialai_dsl.load(scenario))
-    if not lacking:
-        return scenario, ()
-    name, mark, parameters = scenario.partition("?")
-    scripted = f"{name}+oracle{mark}{parameters}"
+def _closest_script(scenario: str, loaded: Loaded | None) -> Scripted:
+    """The scenario itself or its variant `oracle`, of which some members may have no script even there."""
+    plain = Scripted(scenario, loaded or socialai_dsl.load(scenario))
+    if not unscripted(plain.loaded):
+        return plain
+    base, mark, parameters = scenario.partition("?")
+    name = f"{base}+oracle{mark}{parameters}"
     try:
-        loaded = socialai_dsl.load(scripted)
+        return Scripted(name, socialai_dsl.load(name))
     except socialai_dsl.ScenarioError as error:
         if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            return scenario, lacking
+            return plain
         raise
-    return scripted, unscripted(loaded)
 
 
 @dataclass(frozen=True)
@@ -183,7 +193,7 @@ def play_script(
     Raises:
         UsageError: there is no script.
     """
-    scripted, whole = with_script(scenario), Clock() if clock is None else clock
+    scripted, whole = with_script(scenario).name, Clock() if clock is None else clock
     played = _Played(np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64), [""] * rooms)
     findings: list[Finding] = []
     with whole.until_interrupted():

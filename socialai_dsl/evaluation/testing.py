@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, about_of
+from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs.factory import compiled
+from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.episodes import EvalResult, Policy, evaluate
 from socialai_dsl.evaluation.export import SCENARIO
@@ -35,7 +37,7 @@ class Evaluation:
     """Test episodes as an agent played them.
 
     Attributes:
-        scenario: as it was asked for. about: what its file says of it. program: the scenario's.
+        scenario: as it was asked for. loaded: the same. program: the scenario's.
         player: who played.
         result: what came of it.
         endings: in the order of the program's outcomes.
@@ -46,7 +48,7 @@ class Evaluation:
     """
 
     scenario: str
-    about: str
+    loaded: Loaded
     program: Playable
     player: Player
     result: EvalResult
@@ -121,7 +123,7 @@ class Evaluation:
 
     def traces(self, numbers: Iterable[int]) -> list[Trace]:
         """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
-        env = socialai_dsl.make(self.scenario)
+        env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded))
         try:
             policy = make_policy(self.player, env)[0] if self.player.is_trained else None
             return [self._trace(env, policy, number) for number in numbers]
@@ -140,7 +142,7 @@ class Evaluation:
             agent=self.player.agent,
             episode=f"test episode {number}",
             endings=endings,
-            about=self.about,
+            about=about_of(self.loaded),
             think=None if policy is None else _thinking(policy, number),
             replies=self.replies.get(number, ()),
             cut_short=cut_short if self.is_cut_short(number) else None,
@@ -175,11 +177,17 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
     """
     player = agent if isinstance(agent, Player) else Player(named_agent(agent, scenario))
     loaded = socialai_dsl.load(scenario)
-    program = compiled(loaded)
+    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
+
+
+def play_test_set(
+    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int
+) -> Evaluation:
+    """`evaluate_agent` of a scenario that is loaded and compiled."""
     endings = endings_of(loaded, program)
     if player.agent == "human":
         result, actions = _let_a_person_play(scenario, program, episodes)
-        return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions)
+        return Evaluation(scenario, loaded, program, player, result, endings, actions)
     if player.options is not None:
         played = let_a_model_play(
             player.agent, scenario, loaded, program, episodes, player.out, player.options
@@ -188,7 +196,7 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
     if player.is_trained:
         require_trainer()
     envs = socialai_dsl.make_vec(
-        with_script(scenario) if player.agent == "oracle" else program,
+        compiled(with_script(scenario, loaded).loaded) if player.agent == "oracle" else program,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
         autoreset_mode="Disabled",
@@ -202,7 +210,7 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
     finally:
         envs.close()
     actions = {number: policy.played[number][:length] for number, length in enumerate(result.lengths)}
-    return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions, told)
+    return Evaluation(scenario, loaded, program, player, result, endings, actions, told)
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
@@ -222,7 +230,7 @@ def _of_model(
 ) -> Evaluation:
     return Evaluation(
         scenario,
-        about_of(loaded),
+        loaded,
         program,
         player,
         played.result,

@@ -35,9 +35,14 @@ def children(node: Any) -> Iterator[Any]:
 
 def walk(tree: object) -> Iterator[Any]:
     """Every node of a tree, or of a tuple or list of trees, depth first."""
-    for node in _nodes(tree):
-        yield node
-        yield from walk(tuple(children(node)))
+    waiting: list[Any] = [tree]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, tuple | list):
+            waiting.extend(reversed(value))
+        elif _is_node(value.__class__):
+            yield value
+            waiting.extend(getattr(value, name) for name in reversed(_names(value.__class__)))
 
 
 def every(kind: type[Kind], tree: object) -> Iterator[Kind]:
@@ -60,19 +65,20 @@ def _changed(value: Any, change: Callable[[Any], Any]) -> Any:
     if isinstance(value, tuple):
         others = tuple(_changed(part, change) for part in value)
         return others if any(other is not part for other, part in zip(others, value, strict=True)) else value
-    return change(value) if _is_node(value) else value
+    return change(value) if _is_node(value.__class__) else value
 
 
-def _nodes(value: object) -> Iterator[Any]:
+def _nodes(value: Any) -> Iterator[Any]:
     if isinstance(value, tuple | list):
         for part in value:
             yield from _nodes(part)
-    elif _is_node(value):
+    elif _is_node(value.__class__):
         yield value
 
 
-def _is_node(value: object) -> bool:
-    return hasattr(type(value), "__dataclass_fields__") and not isinstance(value, Leaf)
+@cache
+def _is_node(kind: type) -> bool:
+    return hasattr(kind, "__dataclass_fields__") and not issubclass(kind, Leaf)
 
 
 @cache

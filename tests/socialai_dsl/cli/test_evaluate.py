@@ -159,8 +159,8 @@ def test_recordings_show_every_way_of_failing() -> None:
     """Seven failures of one kind, one of another."""
     outcome = np.array([1, 1, 1, 0, 1, 1, 2, 1, 1, 0])
     result = EvalResult(outcome == 0, outcome, np.ones(10, np.int64), np.zeros(10), ("won", "late", "dead"))
-    program: Any = None
-    evaluation = Evaluation("any", "", program, Player("random"), result, [], {})
+    nothing: Any = None
+    evaluation = Evaluation("any", nothing, nothing, Player("random"), result, [], {})
     assert evaluation.pick(False, 3) == [0, 1, 6]
     assert evaluation.pick(False, 100) == [0, 1, 2, 4, 5, 6, 7, 8]
     assert evaluation.pick(True, 3) == [3, 9]

@@ -177,7 +177,7 @@ def test_the_automatic_bonus_is_the_paper_s() -> None:
     found = {}
     for name in BONUSES:
         typed = [name, "--bonus", "auto", "--recipe", "plain", "--device", "cpu"]
-        config = new_config(parser.parse_args(typed))
+        config, _ = new_config(parser.parse_args(typed))
         found[name] = (config.bonus, config.bonus_c)
     assert found == BONUSES
 
@@ -422,14 +422,15 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
         "acts": "suite: acts\nabout: Two.\nmembers: [corridor.yaml, short.yaml]\ndraw: in_sequence\n",
     }.items():
         Path(f"{name}.yaml").write_text(text)
-    usual = {name: usual_for("guided", f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
+    loaded = {name: socialai_dsl.load(f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
+    usual = {name: usual_for("guided", one) for name, one in loaded.items()}
     assert usual == {
         "corridor": {"frames": 1_000_000},
         "short": {"frames": 4096},
         "pair": {"frames": 8192, "curriculum": "even"},
         "acts": {"frames": 6_000_000},  # nothing is drawn that a curriculum could choose
     }
-    assert usual_for("plain", "pair.yaml") == {"frames": 600_000}
+    assert usual_for("plain", loaded["pair"]) == {"frames": 600_000}
 
 
 @pytest.mark.thorough("trains twice")
