@@ -22,7 +22,7 @@ from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import Data, Node
+from socialai_dsl.source import Data, DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
@@ -269,6 +269,9 @@ _OF_ALL_VARIANTS = frozenset({"W314", "W317"})
 _MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 S310 S315 S401 S402".split())
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
+_FOLLOW_FROM_THE_GRAMMAR = frozenset({"S201", "S204", "S302", "S303", "S401", "S402"})
+"""The same of the grammar: it has the names of slots, and the types of what can be said."""
+
 _OF_WHOLE_FILES = frozenset({"S316"})
 """What can only be said of a file without other errors: whatever has one may be what would make it possible."""
 
@@ -344,9 +347,13 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     if not bag.has_errors:
         bag.extend(found)
         return checked
-    doubtful = _OF_WHOLE_FILES | (_MAY_FOLLOW if shaped.lost else frozenset())
+    doubtful = _OF_WHOLE_FILES.union(*map(_following, shaped.lost))
     bag.extend(d for d in found if d.severity is Severity.ERROR and d.code not in doubtful)
     return None
+
+
+def _following(lost: DataPath) -> frozenset[str]:
+    return _FOLLOW_FROM_THE_GRAMMAR if lost == ("grammar",) else _MAY_FOLLOW
 
 
 def put_grammar(tree: Node, bag: DiagnosticBag) -> None:

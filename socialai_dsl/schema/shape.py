@@ -290,12 +290,12 @@ class ShapedFile(Generic[M]):
     Attributes:
         model: None if not even the rest of the file can be used.
         tree: the document the model was made from, with mistakes of shape repaired.
-        lost: whether something was left out that other parts of the file may name.
+        lost: what was left out that other parts of the file may name.
     """
 
     model: M | None
     tree: Node
-    lost: bool
+    lost: tuple[DataPath, ...] = ()
 
 
 def model_of(
@@ -325,7 +325,7 @@ def model_of(
         _Mender(model, repaired.tree, bag).mend(())
     fill_gaps(repaired, bag)
     if made is not None and len(bag) == known:
-        return ShapedFile(made, repaired.tree, False)
+        return ShapedFile(made, repaired.tree)
     try:
         made = _made(model, repaired.tree.data)
     except ValidationError as error:
@@ -336,8 +336,8 @@ def model_of(
             missing = [key for key in _STAND_INS if key not in data]
             repaired.lost += [(key,) for key in missing]
             made = _tried(model, data | {key: _STAND_INS[key] for key in missing})
-    matters = any(str(path[-1]) not in _INDIFFERENT for path in repaired.lost)
-    return ShapedFile(made, repaired.tree, matters)
+    lost = tuple(path for path in repaired.lost if str(path[-1]) not in _INDIFFERENT)
+    return ShapedFile(made, repaired.tree, lost)
 
 
 def _made(model: type[M], data: object) -> M:
@@ -354,7 +354,7 @@ def _tried(model: type[M], data: object) -> M | None:
 
 _STAND_INS: Final[dict[str, Data]] = {
     "scenario": "unnamed",
-    "grammar": {"templates": ["Hello"]},
+    "grammar": {"templates": ["Hello"], "nouns": ["you"]},
     "room": {"size": 30},
     "cast": {"agent": {}},
     "outcome": [{"success": "t == 1"}],
