@@ -29,7 +29,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import display_name, read_document, yaml_files_below
+from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -42,7 +42,6 @@ __all__ = [
     "LoadedScenario",
     "LoadedSuite",
     "check",
-    "check_files",
     "load",
     "load_experiment",
 ]
@@ -350,16 +349,6 @@ def _sifted(result: CheckResult) -> CheckResult:
     if suite is not None and sifted.used:
         suite = replace(suite, warnings=sifted.kept)
     return replace(result, diagnostics=sifted.kept, used=sifted.used, suite=suite)
-
-
-def check_files(paths: Iterable[str | Path]) -> Iterator[CheckResult]:
-    """Check files and every YAML file in folders, each once, in order of their names."""
-    seen: set[str] = set()
-    for path in map(Path, paths):
-        for file in yaml_files_below(path) if path.is_dir() else [str(path)]:
-            if file not in seen:
-                seen.add(file)
-                yield check(file)
 
 
 def _checked(resolved: ResolvedFile, bag: DiagnosticBag) -> tuple[CheckedScenario | None, Scenario | None]:

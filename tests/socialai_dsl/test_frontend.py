@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +10,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.frontend import check, check_files, load
+from socialai_dsl.frontend import check, load
 
 ROOT = Path(__file__).parent.parent.parent
 SHIPPED = sorted(ROOT.glob("scenarios/talkitout*.yaml"))
@@ -119,16 +118,6 @@ def test_an_abstract_scenario_is_checked_for_its_shape_alone(write):
 def test_the_prelude_is_a_library_like_any_other():
     for library in (ROOT / "socialai_dsl" / "prelude").glob("*.yaml"):
         assert check(library).diagnostics == ()
-
-
-def test_folders_are_checked_file_by_file(tmp_path):
-    shutil.copy(SMALL, tmp_path / "b.yaml")
-    (tmp_path / "inner").mkdir()
-    shutil.copy(SMALL, tmp_path / "inner" / "a.yml")
-    (tmp_path / "notes.txt").write_text("no scenario")
-    results = list(check_files([tmp_path, tmp_path / "b.yaml"]))
-    assert [Path(r.name).name for r in results] == ["b.yaml", "a.yml"]
-    assert all(r.checked for r in results)
 
 
 # -- parameters ----------------------------------------------------------------------------------------------------
