@@ -16,7 +16,7 @@ from pydantic import (
 )
 
 from socialai_dsl.errors import first_mistake
-from socialai_dsl.schema.scenario import Model, Prose, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many
 from socialai_dsl.schema.suite import MemberName
 from trainer.config import FLAGS, HYPER, RunConfig
 
@@ -24,8 +24,7 @@ Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""
 
 Labels = Annotated[
-    tuple[Label, ...],
-    BeforeValidator(_as_tuple),
+    ListOf[Label],
     BeforeValidator(_one_or_many, json_schema_input_type=Label | tuple[Label, ...]),
 ]
 
@@ -105,7 +104,7 @@ class Settings(_RunOptions):
     scenario: MemberName | None = Field(
         None, description="a shipped name, or a path relative to this file; with variants and parameters"
     )
-    variants: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] | None = Field(
+    variants: ListOf[Word] | None = Field(
         None, description="variants applied to the scenario and to its tests"
     )
     agent: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
@@ -116,13 +115,12 @@ class Settings(_RunOptions):
     seeds: (
         Annotated[int, Field(ge=1, le=10_000)]
         | Annotated[
-            tuple[Annotated[int, Field(ge=0)], ...],
-            BeforeValidator(_as_tuple),
+            ListOf[Annotated[int, Field(ge=0)]],
             Field(min_length=1, max_length=10_000),
         ]
         | None
     ) = Field(None, description="the number of seeds, from 0 on, or a list of seeds")
-    tests: Annotated[tuple[Test, ...], BeforeValidator(_as_tuple)] | None = Field(
+    tests: ListOf[Test] | None = Field(
         None, description="scenarios that the agents play besides their own when they are trained"
     )
     reference: Reference | None = Field(None, description="a published figure of the scenario itself")
@@ -155,9 +153,7 @@ AxisValue = Annotated[
 ]
 
 Axis = Annotated[
-    Annotated[
-        tuple[str | int, ...], BeforeValidator(_as_tuple), Field(min_length=1, max_length=1000), Tag("list")
-    ]
+    Annotated[ListOf[str | int], Field(min_length=1, max_length=1000), Tag("list")]
     | Annotated[dict[Label, AxisValue], Field(min_length=1, max_length=1000), Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
 ]
@@ -184,7 +180,7 @@ ConditionOrGrid = Annotated[
         )
     ),
 ]
-ConditionList = Annotated[tuple[ConditionOrGrid, ...], BeforeValidator(_as_tuple), Field(max_length=1000)]
+ConditionList = Annotated[ListOf[ConditionOrGrid], Field(max_length=1000)]
 
 
 class Override(Model):
@@ -196,7 +192,7 @@ class Override(Model):
     set: Settings = Field(description="their settings")
 
 
-OverrideList = Annotated[tuple[Override, ...], BeforeValidator(_as_tuple), Field(max_length=1000)]
+OverrideList = Annotated[ListOf[Override], Field(max_length=1000)]
 
 
 class Profile(Model):

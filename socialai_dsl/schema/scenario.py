@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, WithJsonSchema
 from pydantic.config import JsonDict
@@ -63,16 +63,18 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+Item = TypeVar("Item")
+ListOf = Annotated[tuple[Item, ...], BeforeValidator(_as_tuple)]
+"""A list in the file, a tuple in the model."""
+
 Expressions = Annotated[
-    tuple[Expression, ...],
-    BeforeValidator(_as_tuple),
+    ListOf[Expression],
     BeforeValidator(_one_or_many, json_schema_input_type=Expression | tuple[Expression, ...]),
 ]
 """One expression, or a list of them."""
 
 Texts = Annotated[
-    tuple[TextLine, ...],
-    BeforeValidator(_as_tuple),
+    ListOf[TextLine],
     BeforeValidator(_one_or_many, json_schema_input_type=TextLine | tuple[TextLine, ...]),
 ]
 """One text, or a list of them."""
@@ -172,11 +174,11 @@ class FirstRule(ThenRule):
 class State(Model):
     """One state of a frame: what is noticed before moving, one body action, what is noticed after it."""
 
-    first: Annotated[tuple[FirstRule, ...], BeforeValidator(_as_tuple)] = Field(
+    first: ListOf[FirstRule] = Field(
         (), description="rules read before moving; the first that holds takes effect"
     )
     do: str | None = Field(None, description="an activity; default stay", examples=["face(agent)"])
-    then: Annotated[tuple[ThenRule, ...], BeforeValidator(_as_tuple)] = Field(
+    then: ListOf[ThenRule] = Field(
         (), description="rules read after moving; the first that holds takes effect"
     )
 
@@ -196,9 +198,7 @@ class Step(Effects):
     when: Expression | None = Field(
         None, description="a condition; while it is false at the entry's turn, the entry is left out"
     )
-    steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = Field(
-        None, description="nested entries, in place of an activity"
-    )
+    steps: ListOf[Step] | None = Field(None, description="nested entries, in place of an activity")
     repeat: Expression | None = Field(
         None, description="how often the nested `steps` are done, at most", examples=[3]
     )
@@ -233,7 +233,7 @@ class Look(Model):
     for_: Expression = Field(
         alias="for", description="a group: objects, or members of the cast", examples=["balls"]
     )
-    words: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field(
+    words: ListOf[Word] = Field(
         min_length=2, max_length=8, description="its values", examples=[["small", "large"]]
     )
     start: Expressions = Field(
@@ -257,7 +257,7 @@ class Frame(Model):
     states: dict[Word, State] | None = Field(
         None, description="name: what is noticed and done in this state of the interaction"
     )
-    steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = Field(
+    steps: ListOf[Step] | None = Field(
         None, description="in place of states: activities in a row, each until it is finished"
     )
 
@@ -275,7 +275,7 @@ class Role(Model):
     """A part that a member of the cast plays: where it is put, and what drives it if it is an NPC."""
 
     place: str | None = Field(None, description="default anywhere")
-    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = Field(
+    at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
@@ -298,7 +298,7 @@ class Belief(Model):
     start: Expression | None = Field(
         None, description="its value at first; default: the true one; `none`: nothing yet"
     )
-    from_: Annotated[tuple[Source, ...], BeforeValidator(_as_tuple)] = Field(
+    from_: ListOf[Source] = Field(
         (),
         alias="from",
         description="in place of `of`: its sources, of which the first that holds in a turn counts",
@@ -318,7 +318,7 @@ class Character(Model):
     )
     color: Expression | None = Field(None, description="default random")
     place: str | None = Field(None, description="default anywhere")
-    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = Field(
+    at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
@@ -415,15 +415,15 @@ class Room(Model):
     )
     width: Expression | None = Field(None, description="width in cells, walls included")
     height: Expression | None = Field(None, description="height in cells, walls included")
-    build: Annotated[tuple[dict[Word, str], ...], BeforeValidator(_as_tuple)] = Field(
+    build: ListOf[dict[Word, str]] = Field(
         (),
         description="fixed things in place of floor, as {type: place}",
         examples=[[{"lava": "column(W // 2)"}]],
     )
     occlusion: bool = Field(False, description="opaque things hide the cells behind them")
-    canvas: (
-        Annotated[tuple[int, ...], BeforeValidator(_as_tuple), Field(min_length=2, max_length=2)] | None
-    ) = Field(None, description="[width, height] of the grid the room lies on; default the largest room")
+    canvas: Annotated[ListOf[int], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="[width, height] of the grid the room lies on; default the largest room"
+    )
 
 
 class ObjectGroup(Model):
@@ -482,7 +482,7 @@ class Observe(Model):
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
-    channels: Annotated[tuple[Channel | Word, ...], BeforeValidator(_as_tuple)] | None = Field(
+    channels: ListOf[Channel | Word] | None = Field(
         None,
         description="the first 4, 6 or 8, carrying, looks; default: 4, carrying where something can be carried, looks",
         examples=[["type", "color", "status", "orientation", "carrying"]],
@@ -499,13 +499,13 @@ class Observe(Model):
 class UtteranceGrammar(Model):
     """The agent's utterances: every template with all values of its slots."""
 
-    templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
+    templates: ListOf[TextLine] = Field(
         min_length=1,
         max_length=64,
         description="texts; <noun> stands for each noun, <slot> for all that a slot can be",
         examples=[["Where is <noun>"]],
     )
-    nouns: Annotated[tuple[TextLine | int, ...], BeforeValidator(_as_tuple)] = Field(
+    nouns: ListOf[TextLine | int] = Field(
         (),
         min_length=1,
         max_length=256,
@@ -532,8 +532,7 @@ class UtteranceGrammar(Model):
 
 _Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
 Names = Annotated[
-    tuple[_Name, ...],
-    BeforeValidator(_as_tuple),
+    ListOf[_Name],
     Field(min_length=1),
     BeforeValidator(
         _one_or_many, json_schema_input_type=_Name | Annotated[tuple[_Name, ...], Field(min_length=1)]
@@ -628,9 +627,7 @@ class Sequence(Model):
     """A sequence of acts, drawn at reset: each element has a move and perhaps an utterance."""
 
     sequence: int = Field(ge=1, le=16, description="the number of elements")
-    moves: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
-        min_length=1, description="the moves to draw from"
-    )
+    moves: ListOf[Primitive] = Field(min_length=1, description="the moves to draw from")
     utterance: SungWith | None = Field(None, description="default: silent")
 
 
@@ -660,16 +657,14 @@ class Scenario(Model):
     abstract: bool = Field(False, description="a base for `extends` only; it cannot be run itself")
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
-    skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="the skills that it needs, for people"
-    )
+    skills: ListOf[Prose] = Field((), description="the skills that it needs, for people")
     training_frames: int | None = Field(
         None, ge=1, description="how long the recipe guided trains an agent for"
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
     earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
     overheard: bool = Field(True, description="whether others within earshot hear what is said to one")
-    actions: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
+    actions: ListOf[Primitive] = Field(
         PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
     )
     params: dict[Word, int | bool | float | str | Parameter] = Field(
@@ -679,7 +674,7 @@ class Scenario(Model):
         description="the agent's utterances: written out, or the name of a shared grammar"
     )
     room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
-    order: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field((), description="placement order")
+    order: ListOf[Word] = Field((), description="placement order")
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
         description="name: an object in the room",
@@ -711,18 +706,18 @@ class Scenario(Model):
         description="who is in the room: the `agent` and the NPCs by name",
         examples=[{"guide": {"frame": "show_the_way"}, "agent": {"place": "anywhere"}}],
     )
-    rules: Annotated[tuple[WorldRule, ...], BeforeValidator(_as_tuple)] = Field(
+    rules: ListOf[WorldRule] = Field(
         (), description="rules about the world, read once a step; each that holds takes effect"
     )
-    outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(
+    outcome: ListOf[Outcome] = Field(
         min_length=1, description="read top to bottom after every step; the first that holds ends the episode"
     )
     reward: Reward = Field(Reward(), description="the reward of a success and of each step")
     observe: Observe = Field(Observe(), description="the agent's perception")
-    require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
+    require: ListOf[Expression] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"
     )
-    check: Annotated[tuple[Property, ...], BeforeValidator(_as_tuple)] = Field(
+    check: ListOf[Property] = Field(
         (), description="properties that `socialai check` verifies; playing never reads them"
     )
     probes: dict[Word, Probe] = Field(

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
+from pydantic import ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
-from socialai_dsl.schema.scenario import WORD_SCHEMA, Model, Prose, UtteranceGrammar, Word, _as_tuple
+from socialai_dsl.schema.scenario import WORD_SCHEMA, ListOf, Model, Prose, UtteranceGrammar, Word
 from socialai_dsl.vocabulary import Primitive
 
 MemberName = Annotated[str, Field(min_length=1, max_length=200)]
 """The path of a scenario, relative to the suite's file, with variants and parameters."""
 
-MemberNames = Annotated[tuple[MemberName, ...], BeforeValidator(_as_tuple)]
+MemberNames = ListOf[MemberName]
 
 
 def _form(value: Any) -> str:
@@ -22,16 +22,14 @@ def _form(value: Any) -> str:
 Label = Annotated[str, StringConstraints(pattern=r"^[^,=\[\]]+$", max_length=80)]
 """A value of a tree's parameter, as people call it."""
 
-Labels = (
-    Annotated[tuple[str | int | float | bool, ...], BeforeValidator(_as_tuple)] | str | int | float | bool
-)
+Labels = ListOf[str | int | float | bool] | str | int | float | bool
 
 
 class Changes(Model):
     """A suite's changes of a scenario, like a variant's, and the start of its episodes."""
 
     set: dict[str, JsonValue] = Field(default_factory=dict, description="path: value, as in a variant")
-    remove: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field((), description="paths")
+    remove: ListOf[str] = Field((), description="paths")
     add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys")
     layout: dict[str, JsonValue] | None = Field(
         None, description="the start of every episode; the rest is drawn"
@@ -56,9 +54,7 @@ class Value(Changes):
 
 
 Values = Annotated[
-    Annotated[
-        tuple[Label | int | float | bool, ...], Field(min_length=1), BeforeValidator(_as_tuple), Tag("list")
-    ]
+    Annotated[ListOf[Label | int | float | bool], Field(min_length=1), Tag("list")]
     | Annotated[dict[Label, Value], Field(min_length=1), Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
 ]
@@ -88,24 +84,17 @@ class Suite(Model):
     suite: Word = Field(description="the name of the suite")
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
-    skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="the skills that it needs, for people"
-    )
+    skills: ListOf[Prose] = Field((), description="the skills that it needs, for people")
     training_frames: int | None = Field(
         None, ge=1, description="how long the recipe guided trains an agent for"
     )
     draw: Literal["uniform", "in_sequence"] = Field(
         "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"
     )
-    members: (
-        Annotated[
-            tuple[MemberName | Entry, ...], BeforeValidator(_as_tuple), Field(min_length=1, max_length=64)
-        ]
-        | None
-    ) = Field(None, description="scenarios")
-    sweep: (
-        dict[MemberName, dict[str, Annotated[tuple[JsonValue, ...], BeforeValidator(_as_tuple)]]] | None
-    ) = Field(
+    members: Annotated[ListOf[MemberName | Entry], Field(min_length=1, max_length=64)] | None = Field(
+        None, description="scenarios"
+    )
+    sweep: dict[MemberName, dict[str, ListOf[JsonValue]]] | None = Field(
         None, min_length=1, description="member: {path: values}; each combination is a member of its own"
     )
     tree: Value | None = Field(None, description="parameters with their values; an episode plays a leaf")
@@ -114,8 +103,7 @@ class Suite(Model):
         Discriminator(_form),
     ] = Field("union", description="union: each text once; concat: one behind the other; or written out")
     actions: Annotated[
-        Annotated[Literal["union"], Tag("word")]
-        | Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple), Tag("written out")],
+        Annotated[Literal["union"], Tag("word")] | Annotated[ListOf[Primitive], Tag("written out")],
         Discriminator(_form),
     ] = Field("union", description="the body actions in every member")
     splits: dict[Word, Split] = Field(default_factory=dict, description="chosen by ?split=NAME")
