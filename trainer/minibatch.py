@@ -16,9 +16,6 @@ from trainer.nets.dialogue import PrefixTree, prefix_tree
 from trainer.rollout import Rollout
 from trainer.session import Session
 
-SMALLEST_SHARE = 1024
-"""Frames below which a thread of its own costs more, waiting for Python's interpreter lock, than it brings."""
-
 
 class Batch(NamedTuple):
     """Frames that the loss is taken over: N of a minibatch, or (T, E) of a whole rollout in the place of N.
@@ -83,7 +80,7 @@ def environments(session: Session, rollout: Rollout, batch: Batch) -> Iterator[l
     config, generator = session.config, session.generator
     groups = []
     for group in torch.randperm(config.envs, generator=generator).tensor_split(config.minibatches):
-        shares = max(1, min(config.threads, len(group) * config.horizon // SMALLEST_SHARE))
+        shares = max(1, min(config.threads, len(group) * config.horizon // session.actor.net.smallest_share))
         parts = group.tensor_split(shares)
         groups.append([cut_out(session, rollout, batch, part, len(part) / len(group)) for part in parts])
     for _ in range(config.epochs):

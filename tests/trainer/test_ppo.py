@@ -377,7 +377,7 @@ def test_steps_get_longer_again_up_to_the_schedule(small_config: Any) -> None:
 
 
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trainer.minibatch.SMALLEST_SHARE", 1)
+    monkeypatch.setattr("trainer.nets.ActorCritic.smallest_share", 1)
     nets = []
     for threads in (1, 2):
         session, rollout = played(small_config(minibatches=1, epochs=1, threads=threads))

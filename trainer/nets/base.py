@@ -114,6 +114,7 @@ class ActorCritic(nn.Module, ABC):
         distinct: whether equal frames may share their features; False for networks whose features depend on the
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
+        smallest_share: frames below which a thread of its own waits for Python's lock longer than it helps.
         precision: number type of that bulk; everything else, and all that is stored, is float32.
         word_rows: the parameters with one row for each word; an agent that plays with another vocabulary keeps the rows
             of the words that both have.
@@ -122,6 +123,7 @@ class ActorCritic(nn.Module, ABC):
 
     distinct = True
     reducible = False
+    smallest_share = 1024
     precision: Precision = "float32"
     word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
     reader_class: type[Reader] = Reader
