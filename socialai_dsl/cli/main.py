@@ -113,6 +113,9 @@ def _add_debug(parser: argparse.ArgumentParser) -> None:
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and execute; every error is answered with one message and its exit code."""
     gc.set_threshold(_NEW_OBJECTS_BETWEEN_COLLECTIONS)
+    # Agents play by many small operations, which PyTorch's threads wait for longer than they compute, most of all where
+    # other work is running. Training sets its own number of threads.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     debug = False
     usual = warnings.formatwarning
     # Users want to know what to look out for, not which line of ours says so.
