@@ -270,7 +270,7 @@ _MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
 _FOLLOW_FROM_THE_GRAMMAR = frozenset({"S201", "S204", "S302", "S303", "S401", "S402"})
-"""The same of the grammar: it has the names of slots, and the types of what can be said."""
+"""What may be wrong only because the grammar was left out, which has the slots and what can be said."""
 
 _OF_WHOLE_FILES = frozenset({"S316"})
 """What can only be said of a file without other errors: whatever has one may be what would make it possible."""

@@ -113,8 +113,8 @@ def _add_debug(parser: argparse.ArgumentParser) -> None:
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and execute; every error is answered with one message and its exit code."""
     gc.set_threshold(_NEW_OBJECTS_BETWEEN_COLLECTIONS)
-    # Agents play by many small operations, which PyTorch's threads wait for longer than they compute, most of all where
-    # other work is running. Training sets its own number of threads.
+    # An agent plays by many small operations: PyTorch's threads wait for each other longer than they compute, above all
+    # beside other work. Training sets its own number of threads.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     debug = False
     usual = warnings.formatwarning

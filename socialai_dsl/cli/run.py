@@ -42,17 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
-    import socialai_dsl
     from socialai_dsl.cli.run_options import resumed, started
     from socialai_dsl.envs.factory import compiled
     from socialai_dsl.evaluation.players import require_trainer
 
     require_trainer()
-    if arguments.resume:
-        config = resumed(arguments)
-        loaded = socialai_dsl.load(config.scenario)
-    else:
-        config, loaded = started(arguments)
+    config, loaded = resumed(arguments) if arguments.resume else started(arguments)
     program = compiled(loaded)
     folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
     with only_writer(folder):

@@ -104,8 +104,13 @@ def started(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
     return new_config(arguments)
 
 
-def resumed(arguments: argparse.Namespace) -> RunConfig:
-    """The configuration of a run that was stopped; `--frames` may be raised, and W&B be told from now on."""
+def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
+    """The configuration of a run that was stopped, and its scenario.
+
+    `--frames` may be raised, and W&B be told from now on.
+    """
+    import socialai_dsl
+
     folder: Path = arguments.resume
     if arguments.scenario is not None or arguments.out is not None:
         raise UsageError(
@@ -125,7 +130,7 @@ def resumed(arguments: argparse.Namespace) -> RunConfig:
             f"--frames: got {resumed.frames}, expected {config.frames}, because guide and schedules of this run "
             "reach from its first frame to its last"
         )
-    return resumed
+    return resumed, socialai_dsl.load(resumed.scenario)
 
 
 def new_config(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:

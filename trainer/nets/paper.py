@@ -66,7 +66,7 @@ class PaperNet(ActorCritic):
 
     batch_norm = False
     reducible = True
-    smallest_share = 128  # whose convolutions are 99 % of the arithmetic, and need no lock
+    smallest_share = 128  # convolutions are 99 % of the arithmetic, and hold no lock
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
         words = max(len(self.reader_class(spec.vocabulary).words), LetterReader.CAPACITY)
