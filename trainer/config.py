@@ -180,10 +180,18 @@ class RunConfig(BaseModel):
         """Whether an update depends on how many frames the run will have, so that more of them are another run."""
         return self.guide != "none" or self.lr_end is not None or self.entropy_coef_end is not None
 
+    def differences(self, other: RunConfig) -> list[str]:
+        """The options that keep a run with these from going on with the other ones."""
+        free = WITHOUT_EFFECT - {"frames"} if self.depends_on_frames else WITHOUT_EFFECT
+        free |= {"device", "threads", "eval_episodes"}
+        fixed = [name for name in type(self).model_fields if name not in free]
+        return [name for name in fixed if getattr(self, name) != getattr(other, name)]
+
     @property
     def code_folder(self) -> Path:
-        """See `code_folder`."""
-        return code_folder(self.scenario)
+        """Where `mine:Net` is looked for first: the folder of the scenario's file; the present one for a name."""
+        file = Path(self.scenario.partition("?")[0].partition("+")[0])
+        return file.parent if file.suffix in (".yaml", ".yml") else Path()
 
     @property
     def own_files(self) -> dict[str, Path]:
@@ -191,12 +199,6 @@ class RunConfig(BaseModel):
         named = {option: getattr(self, option) for option in ("net", "bonus", "curriculum", "guide")}
         files = {option: code_file(name, self.code_folder) for option, name in named.items() if ":" in name}
         return {option: file for option, file in files.items() if file.is_file()}
-
-
-def code_folder(scenario: str) -> Path:
-    """Where `mine:Net` is looked for first: the folder of the scenario's file; the present one if that is a name."""
-    file = Path(scenario.partition("?")[0].partition("+")[0])
-    return file.parent if file.suffix in (".yaml", ".yml") else Path()
 
 
 def code_file(name: str, folder: Path) -> Path:

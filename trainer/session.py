@@ -18,7 +18,7 @@ from torch import Tensor
 from trainer import checkpoint as checkpoints
 from trainer.bonus import Bonus, build_bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
-from trainer.config import WITHOUT_EFFECT, RunConfig
+from trainer.config import RunConfig
 from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.features import Actor, Int64
@@ -216,12 +216,9 @@ class Session:
             raise CheckpointError(
                 "the scenario has changed since this checkpoint; a run resumes only on the same one"
             )
-        old, new = meta.config.model_dump(), self.config.model_dump()
-        free = WITHOUT_EFFECT - {"frames"} if self.config.depends_on_frames else WITHOUT_EFFECT
-        free = free | {"device", "threads", "eval_episodes"}
-        changed = [name for name in new if name not in free and old[name] != new[name]]
-        if changed:
-            detail = ", ".join(f"{name}: {old[name]} -> {new[name]}" for name in changed)
+        old, new = meta.config, self.config
+        if changed := new.differences(old):
+            detail = ", ".join(f"{name}: {getattr(old, name)} -> {getattr(new, name)}" for name in changed)
             if changed == ["frames"]:
                 detail += " (guide and schedules reach from the first frame to the last)"
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")

@@ -24,7 +24,7 @@ from socialai_dsl.evaluation.recordings import record
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent, own_scenario
 from socialai_dsl.run_folder import REPLAY, RESULT, SETTINGS, versions, write_json, write_text
-from trainer.config import code_folder
+from trainer.config import RunConfig
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 FIGURES: Final = "evaluation.json"
@@ -128,13 +128,14 @@ def _player(arguments: argparse.Namespace) -> Player:
         return Player(agent, seed=arguments.seed)
     require_trainer()
     has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
+    scenario = own_scenario(agent) if has_own else arguments.on[0]
     return Player(
         agent,
         resolve_device(arguments.device),
         arguments.greedy,
         arguments.seed,
         arguments.net,
-        code_folder(own_scenario(agent) if has_own else arguments.on[0]),
+        RunConfig(scenario=scenario).code_folder,
     )
 
 

@@ -107,9 +107,10 @@ def started(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
 def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
     """The configuration of a run that was stopped, and its scenario.
 
-    `--frames` may be raised, and W&B be told from now on.
+    What is typed may change how it goes on, as `--frames` and `--threads` do, and not what it computes.
     """
     import socialai_dsl
+    from socialai_dsl.evaluation.players import resolve_device
 
     folder: Path = arguments.resume
     if arguments.scenario is not None or arguments.out is not None:
@@ -122,13 +123,14 @@ def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
         raise UsageError(f"--resume: {error}") from None
     if not config.trains:
         raise UsageError(f"--resume: the agent {config.agent!r} of {folder} is not trained")
-    asked = {"frames": arguments.frames, "wandb": arguments.wandb}
-    changes = {name: value for name, value in asked.items() if value is not None}
-    resumed = checked_config(config.model_dump() | changes)
-    if config.depends_on_frames and resumed.frames != config.frames:  # before its folder says otherwise
+    resumed = checked_config(config.model_dump() | _typed_options(arguments))
+    resumed = resumed.model_copy(update={"device": resolve_device(resumed.device)})
+    if changed := config.differences(resumed):  # before its folder says otherwise
+        name, reason = changed[0], "because a run goes on with the options it began with"
+        if name == "frames":
+            reason = "because guide and schedules of this run reach from its first frame to its last"
         raise UsageError(
-            f"--frames: got {resumed.frames}, expected {config.frames}, because guide and schedules of this run "
-            "reach from its first frame to its last"
+            f"{_typed(name)}: got {getattr(resumed, name)}, expected {getattr(config, name)}, {reason}"
         )
     return resumed, socialai_dsl.load(resumed.scenario)
 
@@ -142,21 +144,20 @@ def new_config(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
     import socialai_dsl
     from socialai_dsl.evaluation.players import resolve_device
 
-    given = {name: getattr(arguments, name) for name in FLAGS if getattr(arguments, name) is not None}
-    hyper = _read_hyper(arguments.hyper)
+    given = _typed_options(arguments)
     trains = given.get("agent", "ppo") == "ppo"
     if not trains:
-        _refuse_training_options(given, arguments)
+        _refuse_training_options(given)
     given["device"] = resolve_device(given.get("device", "auto"))
     given["scenario"] = arguments.scenario
     loaded = socialai_dsl.load(arguments.scenario)
     if not trains:
         return checked_config(given | {"frames": 0}), loaded
     given.setdefault("threads", automatic_threads())
-    recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario, loaded)
+    recipe = given["recipe"] = given.get("recipe") or _usual_recipe(given, arguments.scenario, loaded)
     if given.get("net") not in NET_PRESETS:
         given = usual_for(recipe, loaded) | given
-    return checked_config({"recipe": recipe} | given | hyper), loaded
+    return checked_config(given), loaded
 
 
 def checked_config(given: dict[str, Any]) -> RunConfig:
@@ -172,16 +173,24 @@ def checked_config(given: dict[str, Any]) -> RunConfig:
         name = place.partition(".")[0]
         if not name:  # of options that contradict each other, the message begins with one
             name, _, said = said.partition(": ")
-        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
-        raise UsageError(f"{typed}: {said}") from None
+        raise UsageError(f"{_typed(name)}: {said}") from None
 
 
-def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:
-    asked = [name for name in given if name not in _OF_ANY_AGENT]
-    asked += ["hyper"] * bool(arguments.hyper) + ["recipe"] * bool(arguments.recipe)
-    if asked:
-        option = asked[0].replace("_", "-")
-        raise UsageError(f"--{option}: the agent {given['agent']!r} is not trained")
+def _refuse_training_options(given: dict[str, Any]) -> None:
+    for name in given:
+        if name not in _OF_ANY_AGENT:
+            raise UsageError(f"{_typed(name)}: the agent {given['agent']!r} is not trained")
+
+
+def _typed(name: str) -> str:
+    """An option as it is typed."""
+    return f"--hyper {name}" if name in HYPER else f"--{name.replace('_', '-')}"
+
+
+def _typed_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options that were typed, by name."""
+    given = {name: getattr(arguments, name) for name in (*FLAGS, "recipe")}
+    return {name: value for name, value in given.items() if value is not None} | _read_hyper(arguments.hyper)
 
 
 def _read_hyper(given: Sequence[str]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from socialai_dsl.evaluation.model_card import model_card
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
 from socialai_dsl.run_folder import RESULT, SETTINGS, read_config
-from trainer.config import RunConfig, code_folder
+from trainer.config import RunConfig
 from trainer.shipped import WEIGHTS
 
 if TYPE_CHECKING:
@@ -71,21 +71,21 @@ def write_agent(
 
     moved = MovedScenario.of(loaded, config.scenario)
     moved.copy(out)
-    code = config.own_files.get("net")
-    if code is not None:
-        there = out / code_folder(moved.scenario) / code.relative_to(config.code_folder.resolve())
-        there.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(code, there)
     # Paths of this machine stay here.
     kept = {"scenario": moved.scenario, "curriculum": _without_place(config.curriculum), "wandb": None}
-    config = config.model_copy(update=kept)
-    meta = checkpoint.meta.model_copy(update={"config": config})
+    written = config.model_copy(update=kept)
+    code = config.own_files.get("net")
+    if code is not None:
+        there = out / written.code_folder / code.relative_to(config.code_folder.resolve())
+        there.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(code, there)
+    meta = checkpoint.meta.model_copy(update={"config": written})
     checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
     words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
     write_json(out / VOCABULARY, words)
     result = moved.told({**result, "scenario": moved.scenario})
-    write_text(out / CARD, model_card(config, result, about_of(loaded), agent, WEIGHTS))
-    write_json(out / SETTINGS, config.model_dump())
+    write_text(out / CARD, model_card(written, result, about_of(loaded), agent, WEIGHTS))
+    write_json(out / SETTINGS, written.model_dump())
     write_json(out / RESULT, result)  # last, so that its presence means a complete folder
 
 
