@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-from socialai_dsl.reporting.style import shown
+from socialai_dsl.reporting.style import COLOURS, colour, shown
 
 BLUE: Final = "#2f62b8"
 RED: Final = "#c23b33"
@@ -77,15 +77,19 @@ def _number(value: float | None) -> float:
 
 
 def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:
-    """Write the picture: success over frames above, how episodes ended below."""
+    """Write the picture: success over frames, and below how episodes ended; of a suite, the success of each member."""
     figure = Figure(figsize=(7.2, 6.2), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     figure.suptitle(title, fontsize=11, x=0.01, ha="left", weight="bold")
     _draw_success(above, curve)
-    shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
-    draw_outcomes(below, curve.frames, shares, curve.successes, curve.words, _BELOW)
-    below.set_ylabel("episodes ended by", fontsize=9)
+    members = member_success(curve)
+    if 0 < len(members) <= len(COLOURS):
+        _draw_members(below, curve, members)
+    else:
+        shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
+        draw_outcomes(below, curve.frames, shares, curve.successes, curve.words, _BELOW)
+        below.set_ylabel("episodes ended by", fontsize=9)
     for axes in (above, below):
         axes.set_ylim(0, 1)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -97,7 +101,7 @@ def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:
     figure.savefig(path)
 
 
-def smooth(values: Sequence[float], width: int) -> NDArray[np.float64]:
+def smooth(values: Sequence[float] | NDArray[np.float64], width: int) -> NDArray[np.float64]:
     """Mean over the last `width` values that are not nan; nan where there are none."""
     array = np.asarray(values, np.float64)
     known = ~np.isnan(array)
@@ -153,10 +157,37 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
     axes.set_ylabel("success", fontsize=9)
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.legend(loc="lower right" if led else "upper left", fontsize=8, frameon=False)
+    ends_above = bool(led) or (curve.test is not None and curve.test[1] > 0.5)
+    axes.legend(loc="lower right" if ends_above else "upper left", fontsize=8, frameon=False)
 
 
-_BELOW: Final = {"loc": "upper left", "bbox_to_anchor": (0.0, -0.28)}
+def member_success(curve: Curve) -> dict[str, NDArray[np.float64]]:
+    """Member of a suite -> success in its latest episodes, (B,), nan before its first one; nothing for a scenario."""
+    ended: dict[str, NDArray[np.float64]] = {}
+    won: dict[str, NDArray[np.float64]] = {}
+    for outcome, values in curve.outcomes.items():
+        member, of_suite, _ = outcome.rpartition(": ")
+        if of_suite:
+            shares = np.nan_to_num(values)
+            ended[member] = ended.get(member, 0.0) + shares
+            won[member] = won.get(member, 0.0) + shares * (outcome in curve.successes)
+    rates = {}
+    for member, shares in ended.items():
+        latest = smooth(shares, _window(curve))
+        played = np.where(latest > 0, latest, np.nan)
+        rates[member] = smooth(won[member], _window(curve)) / played
+    return rates
+
+
+def _draw_members(axes: Axes, curve: Curve, members: Mapping[str, NDArray[np.float64]]) -> None:
+    for index, (member, rates) in enumerate(members.items()):
+        axes.plot(curve.frames, rates, color=colour(index), linewidth=1.4, label=shown(member, 64))
+    axes.set_ylabel("success of each", fontsize=9)
+    axes.grid(axis="y", color="#e6e6e6", linewidth=0.8)
+    axes.legend(fontsize=7, frameon=False, ncols=2, **_BELOW)
+
+
+_BELOW: Final[Mapping[str, Any]] = {"loc": "upper left", "bbox_to_anchor": (0.0, -0.28)}
 
 
 def draw_outcomes(

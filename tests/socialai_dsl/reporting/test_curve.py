@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from socialai_dsl.reporting.curve import Curve, draw_learning_curve, draw_outcomes, smooth
+from socialai_dsl.reporting.curve import Curve, draw_learning_curve, draw_outcomes, member_success, smooth
 
 NAN = float("nan")
 WINS = frozenset({"success@3"})
@@ -30,13 +30,29 @@ def test_smoothing_knows_nothing_before_the_first_value() -> None:
         Curve([100], [0.5], {}, WINS, {}, (100, 0.5, 0.46, 0.54)),
         Curve([], [], {}, WINS),
         Curve([100, 200], [NAN, NAN], {"success@3": [NAN, NAN]}, WINS),
+        Curve([100, 200], [0.5, 0.5], {"easy: success@3": [NAN, 0.5], "hard: timeout": [1, 0.5]}, WINS),
     ],
-    ids=["usual", "one update", "nothing", "no episode ended"],
+    ids=["usual", "one update", "nothing", "no episode ended", "a suite"],
 )
 def test_a_picture_is_written(curve: Curve, tmp_path: Path) -> None:
     draw_learning_curve(curve, "title", tmp_path / "curve.png")
     with Image.open(tmp_path / "curve.png") as picture:
         assert min(picture.size) > 400
+
+
+def test_the_success_of_a_member_is_among_its_own_episodes() -> None:
+    outcomes = {
+        "easy: success@3": [0.5, 0.25],
+        "easy: timeout": [0.5, 0],
+        "hard: success@3": [0, 0.25],
+        "hard: failure@4": [0, 0.5],
+    }
+    rates = member_success(
+        Curve([1, 2], [0.5, 0.5], outcomes, frozenset({"easy: success@3", "hard: success@3"}))
+    )
+    np.testing.assert_allclose(rates["easy"], [0.5, 1])
+    np.testing.assert_allclose(rates["hard"], [NAN, 1 / 3])
+    assert member_success(Curve([1], [1], {"success@3": [1]}, WINS)) == {}
 
 
 def test_of_many_outcomes_the_most_frequent_are_drawn_and_the_rest_is_one() -> None:
