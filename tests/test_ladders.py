@@ -43,4 +43,4 @@ def test_who_succeeds_climbs_rung_by_rung(path: Path) -> None:
 
 
 def test_there_are_ladders() -> None:
-    assert len(LADDERS) == 5
+    assert len(LADDERS) == 4
