@@ -38,7 +38,7 @@ def test_who_succeeds_climbs_rung_by_rung(path: Path) -> None:
         for _ in range(1_000):
             curriculum.observe(newest, False, 10)
         assert curriculum.weights()[newest] == max(curriculum.weights()), "who fails stays"
-        for _ in range(501):
+        for _ in range(2_000):
             curriculum.observe(newest, True, 10)
 
 

@@ -70,8 +70,8 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
     assert sources
     for path in sources:
         assert f"socialai_dsl/scenarios/{path.relative_to(ROOT / 'scenarios')}" in names
-    for path in (ROOT / "experiments").glob("*.yaml"):
-        assert f"socialai_dsl/experiments/shipped/{path.name}" in names
+    for path in (ROOT / "experiments").rglob("*.yaml"):
+        assert f"socialai_dsl/experiments/shipped/{path.relative_to(ROOT / 'experiments')}" in names
     weights = list((ROOT / "agents").rglob("*.safetensors"))
     assert weights
     for path in weights:
