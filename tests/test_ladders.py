@@ -1,4 +1,4 @@
-"""`experiments/ladders`: suites that lead up to a scenario, and the one curriculum that climbs them."""
+"""`experiments/ladders`: suites that lead up to a scenario, and the curriculum that climbs them."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
+from socialai_dsl.cli.main import main
 from trainer.curricula import Leaves, build_curriculum
 
 FOLDER = Path(__file__).parents[1] / "experiments" / "ladders"
@@ -29,7 +30,7 @@ def test_only_the_last_rung_is_the_scenario_itself(path: Path) -> None:
 @pytest.mark.parametrize("path", LADDERS, ids=lambda path: path.stem)
 def test_who_succeeds_climbs_rung_by_rung(path: Path) -> None:
     leaves = Leaves.of(socialai_dsl.make_vec(str(path), num_envs=1))
-    curriculum = build_curriculum(str(FOLDER / "phases.yaml"), leaves)
+    curriculum = build_curriculum("ladder", leaves)
     last = len(leaves.names) - 1
     for newest in range(last + 1):
         assert [number for number, weight in enumerate(curriculum.weights()) if weight] == [
@@ -44,3 +45,7 @@ def test_who_succeeds_climbs_rung_by_rung(path: Path) -> None:
 
 def test_there_are_ladders() -> None:
     assert len(LADDERS) == 4
+
+
+def test_everything_beside_the_experiments_is_sound() -> None:
+    assert main(["validate", str(FOLDER.parent)]) == 0

@@ -71,7 +71,7 @@ class RunConfig(BaseModel):
     )
     curriculum: Name = _flag(
         "none",
-        "the choice of a suite's members: none, even, expert, progress, reverse, a .yaml file of phases or "
+        "the choice of a suite's members: none, even, expert, ladder, progress, reverse, a .yaml file of phases or "
         "mine:Curriculum",
     )
     guide: Name = _flag(

@@ -107,7 +107,10 @@ def test_files_that_are_wrong(tmp_path: Path, text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("expart", "expected one of even, expert, progress, reverse, a .yaml file, or mine:Curriculum"),
+        (
+            "expart",
+            "expected one of even, expert, ladder, progress, reverse, a .yaml file, or mine:Curriculum",
+        ),
         ("nowhere.yaml", "nowhere.yaml cannot be read"),
         ("no_such_module:Mine", "there is no module 'no_such_module'"),
         ("json:JSONDecoder", "JSONDecoder lacks the method 'observe'"),

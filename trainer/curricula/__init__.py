@@ -15,11 +15,11 @@ __all__ = ["Curriculum", "Leaves", "Phases", "Tutor", "build_curriculum"]
 
 _CLASSES: dict[str, Callable[[Leaves], Curriculum]] = {"even": EvenFrames, "progress": LearningProgress}
 
-SHIPPED = ("even", "expert", "progress", "reverse")
+SHIPPED = ("even", "expert", "ladder", "progress", "reverse")
 
 
 def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curriculum:
-    """The curriculum of a name: `even`, `expert`, `progress`, `reverse`, a YAML file of phases, or `mine:Curriculum`.
+    """The curriculum of a name: one of `SHIPPED`, a YAML file of phases, or `mine:Curriculum`.
 
     A class of the user's, looked for in `folder` first, is built as `Curriculum(leaves)`.
 

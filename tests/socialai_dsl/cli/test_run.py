@@ -117,6 +117,30 @@ def test_a_resumed_run_equals_one_that_never_stopped(trained: Path) -> None:
     assert result_of("stopped")["eval"] == result_of("straight")["eval"]
 
 
+@pytest.mark.thorough("trains")
+def test_a_resumed_run_keeps_what_it_computes_and_takes_what_only_says_how(
+    trained: Path, capsys: Capture
+) -> None:
+    shutil.copytree(trained, "here")
+    config = json.loads(Path("here/config.json").read_text())
+    for typed, said in {
+        "--seed 5": "--seed: got 5, expected 0, because a run goes on with the options it began with",
+        "--hyper lr=0.5": f"--hyper lr: got 0.5, expected {config['lr']}, because",
+        "--recipe paper": "--recipe: got paper, expected plain, because",
+        "--agent random": "--agent: got random, expected ppo, because",
+        "--hyper lrr=1": "'lrr'; did you mean lr?",
+    }.items():
+        assert run_main(["--resume", "here", *typed.split()]) == 2
+        assert said in capsys.readouterr().err
+        assert json.loads(Path("here/config.json").read_text()) == config
+    threads = config["threads"] + 1
+    how = ["--threads", str(threads), "--eval-episodes", "4", "--keep-checkpoints", "1", "--seed", "0"]
+    with pytest.warns(UserWarning, match=f"threads {threads - 1} -> {threads}"):
+        assert run_main(["--resume", "here", *how]) == 0
+    assert result_of("here")["eval"]["episodes"] == 4
+    assert json.loads(Path("here/config.json").read_text())["threads"] == threads
+
+
 @pytest.mark.thorough("trains the paper's network")
 def test_a_preset_brings_its_numbers_and_options_override_them() -> None:
     few = [
@@ -409,22 +433,6 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     (said,) = capsys.readouterr().err.splitlines()
     assert "--frames: got 4096, expected 2048, because guide and schedules" in said
     assert json.loads(Path("here/config.json").read_text()) == config, "it can still be resumed as it was"
-    for typed, said in {
-        "--seed 5": "--seed: got 5, expected 0, because a run goes on with the options it began with",
-        "--hyper lr=0.5": "--hyper lr: got 0.5, expected 0.001, because",
-        "--recipe plain": "--recipe: got plain, expected guided, because",
-        "--agent random": "--agent: got random, expected ppo, because",
-        "--hyper lrr=1": "'lrr'; did you mean lr?",
-    }.items():
-        assert run_main(["--resume", "here", *typed.split()]) == 2
-        assert said in capsys.readouterr().err
-        assert json.loads(Path("here/config.json").read_text()) == config
-    kept = ["--threads", "2", "--eval-episodes", "4", "--keep-checkpoints", "1", "--seed", "0"]
-    with pytest.warns(UserWarning, match="threads 1 -> 2"):
-        assert run_main(["--resume", "here", *kept]) == 0
-    assert result_of("here")["eval"]["episodes"] == 4
-    assert json.loads(Path("here/config.json").read_text())["threads"] == 2
-    capsys.readouterr()
     assert run_main(["--resume", "here", "--frames", "-1"]) == 2
     assert "--frames: expected at least 0, got -1" in capsys.readouterr().err
     assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0

@@ -145,7 +145,7 @@ def test_a_run_with_a_curriculum_is_resumed_with_it(capsys: Capture) -> None:
     [
         (
             ["school.yaml", "--curriculum", "expart"],
-            "curriculum: got 'expart', expected one of even, expert, progress",
+            "curriculum: got 'expart', expected one of even, expert, ladder, progress",
         ),
         (
             ["school.yaml", "--curriculum", "expert"],
