@@ -19,6 +19,7 @@ SCHOOL = tuple(
     f"school/{name}"
     for name in (
         *("boxes+color", "boxes+asocial+alone", "switches+color", "marbles+pointing", "levers+color"),
+        *("color_match", "color_match_generators", "color_match_marbles", "color_match_switches"),
         *("color_match_swapped", "lever_door_swapped", "marble_pass_swapped", "marble_push"),
     )
 )
