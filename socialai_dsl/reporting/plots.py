@@ -6,6 +6,7 @@ Each is one panel as wide as a telephone; the page sets them side by side where 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import fill
 from typing import Any, Final
 
 import numpy as np
@@ -38,6 +39,7 @@ _LEVELS: Final = (
 )
 _LEGEND: Final[dict[str, Any]] = {"loc": "outside upper left", "ncols": 2}
 _RULES_SHOWN: Final = 6
+_TITLE: Final = 40  # characters of a line, of which a title has up to three
 _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 
 
@@ -216,7 +218,7 @@ def conditions_figure(summaries: Sequence[Summary]) -> Figure:
         for (success, endings, rules), summary in zip(grid.T, summaries, strict=True):
             assert summary.seeds is not None, "internal: only conditions with curves are drawn"
             end = float(summary.seeds.frames[-1])
-            success.set_title(shown(summary.name, 40))
+            success.set_title(fill(shown(summary.name, 3 * _TITLE), _TITLE))
             _curve(success, summary, 0, "training")
             _ends(success, summary, 0, end * 1.03)
             rates(success)
