@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.reporting.analysis import Summary
+from socialai_dsl.reporting.collect import read_runs
+from socialai_dsl.reporting.plots import conditions_figure
 from socialai_dsl.reporting.seeds import align, mean_over_seeds, read_updates
 from tests.socialai_dsl.reporting.synthetic import figures
 
@@ -92,6 +95,18 @@ def test_runs_with_other_hyper_parameters_are_another_condition(
     printed = capsys.readouterr().out
     assert "talkitout / ppo\n" in printed
     assert "talkitout / ppo, lr=0.1, entropy_coef=0.02\n" in printed
+
+
+def test_titles_tell_conditions_apart_that_differ_in_their_last_option(tmp_path: Path) -> None:
+    runs = [make_run(tmp_path, "talkitout", 0, 0.5), make_run(tmp_path, "talkitout", 1, 0.5)]
+    for run, rate in zip(runs, (0.01, 0.02), strict=True):
+        settings = json.loads((run / "config.json").read_text())
+        settings |= {"net": "paper", "bptt": 8, "gae_lambda": 0.99, "entropy_coef": rate}
+        (run / "config.json").write_text(json.dumps(settings))
+    summaries = [Summary(condition) for condition in read_runs(runs).conditions]
+    titles = [axes.get_title(loc="left").replace("\n", " ") for axes in conditions_figure(summaries).axes]
+    shown = [title for title in titles if title]
+    assert [title.rpartition(", ")[2] for title in shown] == ["gae_lambda=0.99", "entropy_coef=0.02"]
 
 
 def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
