@@ -250,10 +250,11 @@ def train(
     config: RunConfig,
     envs: Any,
     run_dir: Path,
-    progress: Callable[[Mapping[str, Any]], None] | None = None,
+    progress: Callable[[Mapping[str, Any]], None] = lambda row: None,
     resume: bool = False,
     tracker: Tracker | None = None,
     program: Any = None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Path:
     """Train a network and return the path of its final checkpoint.
 
@@ -269,6 +270,7 @@ def train(
         resume: continue the run in `run_dir`.
         tracker: sends the figures elsewhere as well.
         program: of the scenario that the agent is for, where a guide plays a variant of it; by default that of `envs`.
+        stop: asked before every update; where it is true, training ends early, and a resumed run goes on from there.
 
     Raises:
         ValueError: configuration and environments do not fit, or the tracker cannot begin.
@@ -287,7 +289,7 @@ def train(
         if not resume:
             session.save(run_dir)
         metrics = Metrics(session)
-        while session.update < config.updates:
+        while session.update < config.updates and not stop():
             session.optimizer.param_groups[0]["lr"] = session.learning_rate
             rollout = collect(session)
             losses = update(session, rollout, mapper)
@@ -297,6 +299,5 @@ def train(
             if session.update % config.checkpoint_every == 0 and session.update < config.updates:
                 log.sync()
                 session.save(run_dir)
-            if progress is not None:
-                progress(row)
+            progress(row)
         return session.save(run_dir)

@@ -11,6 +11,7 @@ import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.cli.learnt import Learnt
 from socialai_dsl.cli.progress import TrainingProgress
+from socialai_dsl.cli.stopping import Stop
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.evaluation.model_card import FILE, model_card
@@ -91,12 +92,18 @@ def train_agent(
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
     try:
-        with TrainingProgress(total, stream) as shown:
+        with Stop() as stop:
+            with TrainingProgress(total, stream) as shown:
 
-            def report(row: Mapping[str, Any]) -> None:
-                shown.update(row["frames"], row["success"], row["frames_per_second"], learnt.sentence(row))
+                def report(row: Mapping[str, Any]) -> None:
+                    shown.update(
+                        row["frames"], row["success"], row["frames_per_second"], learnt.sentence(row)
+                    )
 
-            return train(config, envs, folder, report, resume, _tracker(config, folder), program)
+                tracker = _tracker(config, folder)
+                trained = train(config, envs, folder, report, resume, tracker, program, stop.wished)
+            stop.heed()
+            return trained
     except TrainingStopped as error:
         raise RunFailed(str(error)) from error
     except KeyboardInterrupt:

@@ -131,3 +131,38 @@ def test_a_killed_run_ends_as_one_that_never_stopped(
     assert results[0] == results[1]
     assert (whole / "transcript.txt").read_bytes() == (killed / "transcript.txt").read_bytes()
     assert len(list((killed / "checkpoints").iterdir())) == 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_stopped_saves_what_it_has(
+    started: Callable[..., Process], number: signal.Signals, tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    rare = ["--checkpoint-every", "1000000"]
+    process = started(*GUIDED, *rare, "--frames", "1000000", "--out", str(run))
+    while process.poll() is None and len(lines(run / "metrics.jsonl")) < 3:
+        time.sleep(0.002)
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=60)
+    made = len(lines(run / "metrics.jsonl"))
+    assert "stopping after this update" in output
+    assert read(run / "checkpoints").meta.update == made >= 3, "nothing of what was trained is lost"
+    if number == signal.SIGINT:
+        assert process.returncode == 130
+        assert output.endswith(f"interrupted; go on with: socialai-run --resume {run}\n")
+    else:
+        assert process.returncode == -signal.SIGTERM
+
+
+def test_a_second_signal_stops_at_once(started: Callable[..., Process], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    process = started("help", "--net", "paper-reference", "--threads", "1", "--envs", "64", "--out", str(run))
+    while process.poll() is None and not lines(run / "starts.jsonl"):
+        time.sleep(0.002)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, output
+    assert read(run / "checkpoints").meta.update == len(lines(run / "metrics.jsonl")) == 0
