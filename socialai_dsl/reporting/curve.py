@@ -208,10 +208,10 @@ def draw_outcomes(
         words: outcome -> what the scenario says of it; others are called by their kind and line.
         legend: where it stands, as options of matplotlib's.
     """
-    shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
-    if not shares:
+    parts = _few({name: np.nan_to_num(values) for name, values in shares.items()}, successes)
+    drawn = [part for part in parts if part[2].any()]
+    if not drawn:
         return
-    drawn = _few({name: np.nan_to_num(values) for name, values in shares.items()}, successes)
     axes.stackplot(
         frames,
         [values for _, _, values in drawn],
@@ -225,18 +225,17 @@ def draw_outcomes(
 def _few(
     shares: Mapping[str, NDArray[np.float64]], successes: frozenset[str]
 ) -> list[tuple[str, str, NDArray[np.float64]]]:
-    """Colour, name and share of what is drawn, in order: of each rank the most frequent, and the rest as one.
+    """Colour, name and share of each outcome, in order; where a rank has more than colours, its rarer ones are one.
 
-    A suite has dozens of outcomes; each that is drawn has a colour of its own.
+    An outcome's colour does not depend on how often it happened, so two runs of a scenario have the same colours.
     """
     drawn: list[tuple[str, str, NDArray[np.float64]]] = []
     for rank, called in enumerate(("successes", "failures", "time-outs")):
-        names = sorted(
-            (name for name in shares if _rank(name, successes) == rank),
-            key=lambda name: -float(np.mean(shares[name])),
-        )
-        palette = _PALETTES[rank]
-        alone = len(names) if len(names) <= len(palette) else len(palette) - 1
+        names, palette = [name for name in shares if _rank(name, successes) == rank], _PALETTES[rank]
+        alone = len(names)
+        if alone > len(palette):
+            names.sort(key=lambda name: -float(shares[name].mean()))
+            alone = len(palette) - 1
         drawn += [(colour, name, shares[name]) for colour, name in zip(palette, names[:alone], strict=False)]
         if rest := names[alone:]:
             together = np.sum([shares[name] for name in rest], axis=0)

@@ -67,3 +67,18 @@ def test_of_many_outcomes_the_most_frequent_are_drawn_and_the_rest_is_one() -> N
     ]
     top = max(path.vertices[:, 1].max() for area in axes.collections for path in area.get_paths())  # type: ignore[index]
     assert top == pytest.approx(1.0)
+
+
+def test_an_outcome_has_the_same_colour_however_often_it_happened() -> None:
+    def colours(first: float, second: float) -> dict[str, object]:
+        axes = Figure().subplots()
+        shares = {"failure@1": np.full(3, first), "failure@2": np.full(3, second)}
+        draw_outcomes(axes, [0, 1, 2], shares, frozenset(), {}, {})
+        drawn = {str(area.get_label()): tuple(area.get_facecolor()[0]) for area in axes.collections}  # type: ignore[index]
+        return drawn
+
+    often, seldom = colours(0.9, 0.1), colours(0.1, 0.9)
+    assert often == seldom
+    assert len(set(often.values())) == 2
+    never = colours(0.0, 1.0)
+    assert never == {"failure, line 2": often["failure, line 2"]}, "what never happened is not drawn"
