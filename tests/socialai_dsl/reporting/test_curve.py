@@ -74,8 +74,7 @@ def test_an_outcome_has_the_same_colour_however_often_it_happened() -> None:
         axes = Figure().subplots()
         shares = {"failure@1": np.full(3, first), "failure@2": np.full(3, second)}
         draw_outcomes(axes, [0, 1, 2], shares, frozenset(), {}, {})
-        drawn = {str(area.get_label()): tuple(area.get_facecolor()[0]) for area in axes.collections}  # type: ignore[index]
-        return drawn
+        return {str(area.get_label()): tuple(area.get_facecolor()[0]) for area in axes.collections}  # type: ignore[index]
 
     often, seldom = colours(0.9, 0.1), colours(0.1, 0.9)
     assert often == seldom
