@@ -34,6 +34,8 @@ from socialai_dsl.experiments.folder import (
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
+_SECONDS_TO_SAVE: Final = 10.0
+"""How long a process that is ended may take to save its checkpoint."""
 _CRASHES_IN_PLACE: Final = 3
 """How often a process may die without having got further before its run counts as failed."""
 
@@ -264,8 +266,7 @@ class _Work:
                 self._run.write_status(self._status)
                 self._wait(child)
             finally:
-                child.kill()  # if it still runs; what it had not saved is trained again, to the same bits
-                child.wait()
+                _end(child)
                 assert child.stdin is not None, "internal: the pipe was asked for"
                 child.stdin.close()
             if child.returncode > 0:
@@ -298,6 +299,16 @@ class _Work:
             raise _StoppedError
         if self._run.is_cancelled():
             raise _CancelledError
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    """End a process, if it still runs. What it does not save in time is trained again, to the same bits."""
+    child.terminate()
+    try:
+        child.wait(_SECONDS_TO_SAVE)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
 
 
 def _last_line(stream: IO[bytes]) -> str:

@@ -7,6 +7,7 @@ import argparse
 import hashlib
 import json
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -44,7 +45,9 @@ def run(words: list[str]) -> None:
 
 
 def train(folder: Path, settings: dict) -> str:
-    """Weights after all updates, from the newest checkpoint on."""
+    """Weights after all updates, from the newest checkpoint on; SIGTERM ends it with one more."""
+    wishes: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, frame: wishes.append(number))
     checkpoints = folder / "checkpoints"
     checkpoints.mkdir(exist_ok=True)
     found = sorted(checkpoints.glob("*.safetensors"))
@@ -60,10 +63,12 @@ def train(folder: Path, settings: dict) -> str:
         digest = hashlib.sha256(digest.encode()).hexdigest()
         with open(folder / "metrics.jsonl", "a") as file:
             file.write(json.dumps({"frames": frames, "frames_per_second": 1000.0}) + "\n")
-        if frames // FRAMES_OF_AN_UPDATE % settings["checkpoint_every"] == 0:
+        if wishes or frames // FRAMES_OF_AN_UPDATE % settings["checkpoint_every"] == 0:
             temporary = checkpoints / "new"
             temporary.write_text(digest)
             temporary.rename(checkpoints / f"{frames:015d}.safetensors")
+        if wishes:
+            sys.exit(128 + wishes[0])
     return digest
 
 

@@ -112,6 +112,7 @@ def test_stopped_by_a_person_or_the_system(place, undisturbed, number):
     assert b"the same command goes on" in said
     assert run.status().state == "waiting"
     assert reasons(run) == ["stopped"]
+    assert run.checkpoint_frames() == updates(run)[-1], "an update was not saved"
     assert place.run() == 0
     assert results(place) == undisturbed
 
