@@ -32,6 +32,7 @@ from socialai_dsl.reporting.analysis import (
 from socialai_dsl.reporting.collect import Run
 from socialai_dsl.reporting.records import Reference
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
+from socialai_dsl.reporting.style import scenario_name
 
 _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
 _NONE: Final = "–"
@@ -52,7 +53,12 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         place: the folder where it will lie.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters |= {"spread": spread, "signed": signed, "count_of": count_of}
+    environment.filters |= {
+        "spread": spread,
+        "signed": signed,
+        "count_of": count_of,
+        "scenario_name": scenario_name,
+    }
     template = environment.from_string(
         files("socialai_dsl.reporting").joinpath("page.html.jinja").read_text(encoding="utf-8")
     )

@@ -28,6 +28,7 @@ from socialai_dsl.reporting.style import (
     marker,
     new_axes,
     rates,
+    scenario_name,
     shown,
     styled,
 )
@@ -164,7 +165,14 @@ def curves_figure(
 def _name_line(axes: Axes, name: str, height: float, end: float, ink: str) -> None:
     """Write over a line whose it is, unless a line beside it has its name there."""
     if all(abs(text.get_position()[1] - height) > _BETWEEN for text in axes.texts):
-        axes.text(end * 0.02, height + 0.015, shown(f"on {name}", 30), fontsize=7.5, color=ink, va="bottom")
+        axes.text(
+            end * 0.02,
+            height + 0.015,
+            shown(f"on {scenario_name(name)}", 30),
+            fontsize=7.5,
+            color=ink,
+            va="bottom",
+        )
 
 
 def _curve(axes: Axes, summary: Summary, index: int, label: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from contextlib import AbstractContextManager
 from typing import Any, Final
@@ -58,6 +59,11 @@ def colour(index: int) -> str:
 def marker(index: int) -> str:
     """Its marker, for who sees no colours."""
     return MARKERS[index % len(MARKERS)]
+
+
+def scenario_name(reference: str) -> str:
+    """A scenario without the folder and the ending of its file: `rooms/mine.yaml?n=2` is `mine?n=2`."""
+    return re.sub(r"^.*/|\.yaml", "", reference)
 
 
 def styled() -> AbstractContextManager[None]:

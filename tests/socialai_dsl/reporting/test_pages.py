@@ -33,14 +33,14 @@ def read(folder: Path, place: Path = Path("report")) -> Page:
 def small(folder: Path) -> Analysis:
     """A table of two columns, of which one lacks a row."""
     conditions = [
-        condition("Help / PPO", [0.4, 0.5, 0.6], reference=PUBLISHED, tests=["help_as_helper"],
-                  test_references={"help_as_helper": {"mean": 0.12}}),
+        condition("Help / PPO", [0.4, 0.5, 0.6], reference=PUBLISHED, tests=["rooms/help_as_helper.yaml"],
+                  test_references={"rooms/help_as_helper.yaml": {"mean": 0.12}}),
         condition("Help / Unsocial", [0.2, 0.2, 0.3]),
         condition("Dance / PPO", [0.7]),
     ]  # fmt: skip
     write_experiment(folder, conditions)
     for seed, rate in enumerate((0.1, 0.2, 0.3)):
-        write_tests(folder / "runs" / f"c0-s{seed}", {"help_as_helper": rate})
+        write_tests(folder / "runs" / f"c0-s{seed}", {"rooms/help_as_helper.yaml": rate})
     level = Level(0.25, 0.01, "64 rooms")
     return analyse(read_experiment(folder), {"help": Baselines(Level(1.0, 0.0, "500 episodes"), None, level)})
 
@@ -154,7 +154,7 @@ def test_tables_for_other_programs(analysis: Analysis) -> None:
     first = found["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)
     assert float(first["success_std"]) == pytest.approx(0.1)
-    assert (first["published_mean"], first["tests"]) == ("0.45", "help_as_helper=0.2")
+    assert (first["published_mean"], first["tests"]) == ("0.45", "rooms/help_as_helper.yaml=0.2")
     assert found["conditions"][1]["published_mean"] == ""
     assert {row["id"] for row in found["runs"]} >= {"c0-s0", "c1-s1"}
     assert {(row["file"], row["line"]) for row in found["outcomes"] if row["name"] == "success@56"} == {
