@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from socialai_dsl.checking.curricula import check_curriculum
 from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment, with_scenarios
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.checking.scenarios import (
@@ -31,6 +32,7 @@ from socialai_dsl.diagnostics import (
 from socialai_dsl.loader.comments import comments_of
 from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import Source, Span, Style
@@ -43,6 +45,7 @@ __all__ = [
     "LoadedSuite",
     "check",
     "load",
+    "load_curriculum",
     "load_experiment",
 ]
 
@@ -217,6 +220,7 @@ class CheckResult:
         suite: the suite with its members, if it is one and nothing is wrong with it.
         used: the places of the codes in comments that silenced a warning.
         experiment: the experiment with its conditions, if it is one and nothing is wrong with it.
+        curriculum: the curriculum, if it is one.
     """
 
     name: str
@@ -228,6 +232,7 @@ class CheckResult:
     suite: LoadedSuite | None = None
     used: frozenset[Span] = frozenset()
     experiment: LoadedExperiment | None = None
+    curriculum: Curriculum | None = None
 
     @property
     def has_errors(self) -> bool:
@@ -289,11 +294,28 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
     result = check(name)
     resolved = result.read()
     if result.experiment is None:
-        kind = resolved.kind
-        message = f"this is a file of the kind `{kind}`, not an experiment"
-        span = resolved.tree.key_span((kind,))
-        raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
+        raise _other_kind(result, resolved, "an experiment")
     return result.experiment
+
+
+def load_curriculum(path: str | Path) -> Curriculum:
+    """A curriculum's file.
+
+    Raises:
+        ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
+    """
+    result = check(path)
+    resolved = result.read()
+    if result.curriculum is None:
+        raise _other_kind(result, resolved, "a curriculum")
+    return result.curriculum
+
+
+def _other_kind(result: CheckResult, resolved: ResolvedFile, expected: str) -> ScenarioError:
+    message = f"this is a file of the kind `{resolved.kind}`, not {expected}"
+    return ScenarioError(
+        [Diagnostic("S108", message, resolved.tree.key_span((resolved.kind,)))], result.sources
+    )
 
 
 def check(
@@ -323,6 +345,10 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
         return _sifted(
             CheckResult(name, None, None, tuple(said_once(bag)), dict(resolved.files), resolved, suite)
         )
+    if resolved.kind == "curriculum":
+        curriculum = check_curriculum(resolved, bag)
+        files = dict(resolved.files)
+        return _sifted(CheckResult(name, None, None, tuple(bag), files, resolved, curriculum=curriculum))
     if resolved.kind == "experiment":
         experiment = check_experiment(resolved, bag)
         files = dict(resolved.files)
@@ -342,7 +368,9 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
 def _sifted(result: CheckResult) -> CheckResult:
     """Without the warnings that comments ignore; a file whose warnings are all known is to have no idle ones."""
     assert result.resolved is not None, "internal: what was checked has been read"
-    meant = (result.checked, result.suite, result.experiment) != (None, None, None)
+    meant = any(
+        part is not None for part in (result.checked, result.suite, result.experiment, result.curriculum)
+    )
     judged = display_name(result.resolved.path) if meant and not result.has_errors else None
     sifted = sift(result.diagnostics, result.sources, judged)
     suite = result.suite

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary
+from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
 
 Schema = dict[str, Any]
@@ -29,6 +30,7 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
     "variant": (VariantFile,),
     "library": (ObjectLibrary, GrammarLibrary),
     "experiment": (ExperimentFile,),
+    "curriculum": (Curriculum,),
 }
 """The key that says the kind of a file -> the models of such files."""
 

@@ -24,7 +24,7 @@ from socialai_dsl.loader.reader import (
 )
 from socialai_dsl.source import DataPath, Node, Source, Span
 
-KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment")
+KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment", "curriculum")
 """The kinds of file; exactly one of these keys is present."""
 
 ANY: Final = "any"

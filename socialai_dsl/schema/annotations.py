@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
+from socialai_dsl.schema.curriculum import Curriculum, Group, Phase, Ramp, Until
 from socialai_dsl.schema.experiment import (
     Condition,
     Experiment,
@@ -90,11 +91,20 @@ CALLED: Final[dict[type, str]] = {
     Profile: "a profile",
     Transfer: "a test",
     Reference: "a reference",
+    Curriculum: "a curriculum",
+    Phase: "a phase",
+    Group: "a group of members",
+    Ramp: "a weight that changes",
+    Until: "the end of a phase",
 }
 """How messages call what a model describes."""
 
 
-_OF_EXPERIMENTS: Final = (Experiment, Condition, Grid, Settings, Override, Profile, Transfer, Reference)
+_FAMILIES: Final = (
+    (Experiment, Condition, Grid, Settings, Override, Profile, Transfer, Reference),
+    (Curriculum, Phase, Group, Ramp, Until),
+)
+"""Models of the files that are not about scenarios."""
 
 
 def keys_of(model: type) -> list[str]:
@@ -108,9 +118,13 @@ def home_of(key: str, owner: type | None) -> str | None:
     homes = [
         called
         for model, called in CALLED.items()
-        if key in keys_of(model) and (model in _OF_EXPERIMENTS) == (owner in _OF_EXPERIMENTS)
+        if key in keys_of(model) and _family(model) == _family(owner)
     ]
     return " or ".join(dict.fromkeys(homes[:2])) if homes else None
+
+
+def _family(model: type | None) -> tuple[type, ...]:
+    return next((family for family in _FAMILIES if model in family), ())
 
 
 def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:

@@ -8,11 +8,12 @@ import pytest
 import torch
 
 import socialai_dsl as sd
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.frontend import load_curriculum
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.curricula import Leaves, Phases, build_curriculum
 from trainer.curricula.even import EvenFrames
-from trainer.curricula.phases import read_phases
 from trainer.curricula.progress import WINDOW, LearningProgress
 from trainer.errors import CheckpointError
 from trainer.ppo import train
@@ -80,7 +81,7 @@ def test_a_reverse_curriculum_falls_from_one_to_zero() -> None:
 def test_groups_share_by_their_weights_and_keep_the_suites_own(tmp_path: Path) -> None:
     leaves = Leaves(("a", "b", "c"), ({"k": "1"}, {"k": "1"}, {"k": "2"}), (1, 3, 5))
     text = "  - play: [{only: {k: 1}, weight: 3}, {members: [c], weight: 1}]"
-    weights = Phases(read_phases(written(tmp_path, text)), leaves).weights()
+    weights = Phases(load_curriculum(written(tmp_path, text)), leaves).weights()
     assert np.array(weights) / sum(weights) == pytest.approx([3 / 16, 9 / 16, 4 / 16], abs=1e-5)
 
 
@@ -91,17 +92,32 @@ def test_groups_share_by_their_weights_and_keep_the_suites_own(tmp_path: Path) -
         ("  - play: [{only: {l: 1}}]", "no values: the suite has no such parameter"),
         ("  - play: [{members: [d]}]", "the suite has no member 'd'"),
         ("  - play: [{without: {k: [1, 2]}}]", "no member of the suite is in this group"),
-        ("  - {}\n  - {}", "phases.0: only the last phase may be without `until`"),
-        ("  - until: {episode: 3}", "phases.0.until.episode: Extra inputs are not permitted"),
-        ("  - {play: [", "is not YAML"),
-        ("", "phases: Input should be"),
     ],
 )
-def test_files_that_are_wrong(tmp_path: Path, text: str, message: str) -> None:
+def test_phases_that_do_not_fit_the_suite(tmp_path: Path, text: str, message: str) -> None:
     leaves = Leaves(("a", "b", "c"), ({"k": "1"}, {"k": "1"}, {"k": "2"}), (1, 3, 5))
     with pytest.raises(ValueError, match="curriculum: ") as raised:
-        Phases(read_phases(written(tmp_path, text)), leaves)
+        Phases(load_curriculum(written(tmp_path, text)), leaves)
     assert message in str(raised.value)
+
+
+def test_all_mistakes_of_a_file_are_said_with_their_places(tmp_path: Path) -> None:
+    text = "  - play: [{wieght: 3, only: {k: 1}}]\n  - until: {success: 1.5}\n  - play: [{weight: {from: 1, to: 0}}]"
+    with pytest.raises(ScenarioError) as raised:
+        build_curriculum(str(written(tmp_path, text)), EXPERT)
+    assert [(d.code, d.span.line, d.message) for d in raised.value.diagnostics] == [
+        ("S105", 3, "phase 1 never ends, so those after it are never played"),
+        ("S101", 3, "unknown key `wieght` in a group of members"),
+        ("S106", 4, "`1.5` is too large; at most 1 is expected"),
+        ("S105", 5, "`weight` needs a key `over`"),
+    ]
+
+
+@pytest.mark.parametrize("name", ["nowhere.yaml", "scenario.yaml"])
+def test_files_that_are_no_curriculum(tmp_path: Path, name: str) -> None:
+    (tmp_path / "scenario.yaml").write_text("scenario: mine\nextends: talkitout\n")
+    with pytest.raises(ScenarioError, match=r"there is no such file|not a curriculum"):
+        build_curriculum(str(tmp_path / name), EXPERT)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +127,6 @@ def test_files_that_are_wrong(tmp_path: Path, text: str, message: str) -> None:
             "expart",
             "expected one of even, expert, ladder, progress, reverse, a .yaml file, or mine:Curriculum",
         ),
-        ("nowhere.yaml", "nowhere.yaml cannot be read"),
         ("no_such_module:Mine", "there is no module 'no_such_module'"),
         ("json:JSONDecoder", "JSONDecoder lacks the method 'observe'"),
     ],

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from socialai_dsl.frontend import load_curriculum
 from trainer.curricula.base import Curriculum, Leaves, Tutor
 from trainer.curricula.even import EvenFrames
-from trainer.curricula.phases import Phases, read_phases
+from trainer.curricula.phases import Phases
 from trainer.curricula.progress import LearningProgress
 from trainer.extensions import load_class
 
@@ -25,12 +26,13 @@ def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curric
 
     Raises:
         ValueError: there is no such curriculum, or it does not fit the suite.
+        ScenarioError: the file has mistakes.
     """
     if name in _CLASSES:
         return _CLASSES[name](leaves)
     if name in SHIPPED:
-        return Phases(read_phases(Path(__file__).with_name(f"{name}.yaml")), leaves)
+        return Phases(load_curriculum(Path(__file__).with_name(f"{name}.yaml")), leaves)
     if name.endswith((".yaml", ".yml")):
-        return Phases(read_phases(Path(name)), leaves)
+        return Phases(load_curriculum(name), leaves)
     made: Curriculum = load_class(name, "curriculum", (*SHIPPED, "a .yaml file"), Curriculum, folder)(leaves)
     return made
