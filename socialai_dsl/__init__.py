@@ -4,6 +4,7 @@ The public surface, imported on first use so that checking a file loads neither 
 
 * `load(name)`: check a file, or a shipped scenario or suite by name, with variants: `talkitout+unsocial`.
 * `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map; of a suite a `ProgramSuite`.
+* `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from socialai_dsl.compilation import compile_loaded as compile
     from socialai_dsl.diagnostics import Diagnostic, ScenarioError
     from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_vec
-    from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load
+    from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load, load_curriculum
     from socialai_dsl.program import Program
     from socialai_dsl.program_suite import ProgramSuite
 
@@ -28,6 +29,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "load": ("socialai_dsl.frontend", "load"),
+    "load_curriculum": ("socialai_dsl.frontend", "load_curriculum"),
     "LoadedScenario": ("socialai_dsl.frontend", "LoadedScenario"),
     "LoadedSuite": ("socialai_dsl.frontend", "LoadedSuite"),
     "compile": ("socialai_dsl.compilation", "compile_loaded"),
@@ -52,6 +54,7 @@ __all__ = [
     "ScenarioVectorEnv",
     "compile",
     "load",
+    "load_curriculum",
     "make",
     "make_vec",
 ]

@@ -16,6 +16,7 @@ from socialai_dsl.cli import main
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Op, TypeColumn
 from socialai_dsl.schema.annotations import CALLED, keys_of
+from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.scenario import SlotType
 from socialai_dsl.semantics.signatures import SIGNATURES, WORDS
@@ -225,13 +226,15 @@ def test_the_reference_has_every_instruction(name: str) -> None:
 
 
 MODELS = [*CALLED, ObjectLibrary, ObjectTypeModel, GrammarLibrary]
-EXPERIMENTS = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
+PAGES = {Experiment.__module__: "experiments.md", Curriculum.__module__: "curricula.md"}
+"""Module of models -> the page about its files, if that is not the one about the language."""
 
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
 def test_the_reference_has_every_key(model: type) -> None:
-    page = EXPERIMENTS if model.__module__ == Experiment.__module__ else REFERENCE
-    assert [key for key in keys_of(model) if key not in mentioned(page)] == []
+    page = PAGES.get(model.__module__)
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8") if page else REFERENCE
+    assert [key for key in keys_of(model) if key not in mentioned(text)] == []
 
 
 def test_the_reference_has_every_word() -> None:

@@ -107,9 +107,18 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
 }
 
-# What the trainer may use: the facade's names, nothing below it.
+# What the trainer may use: the facade's names, and the models of a curriculum, which it plays; nothing below.
 FACADE = {"socialai_dsl"} | {
-    f"socialai_dsl.{name}" for name in ("load", "compile", "make", "make_vec", "evaluation.episodes")
+    f"socialai_dsl.{name}"
+    for name in (
+        "load",
+        "load_curriculum",
+        "compile",
+        "make",
+        "make_vec",
+        "evaluation.episodes",
+        "schema.curriculum",
+    )
 }
 
 
