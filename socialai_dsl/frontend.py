@@ -355,6 +355,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
         right = None
         if experiment is not None:
             played = _check_played(experiment, bag, files)
+            _check_curricula(experiment, bag, files)
             right = None if bag.has_errors else with_scenarios(experiment, played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
@@ -411,15 +412,37 @@ def _check_played(
             what = "an abstract scenario" if kind == "scenario" else f"a file of the kind `{kind}`"
             bag.error("S108", f"`{written}` is {what}; only a scenario or a suite can be run", span)
             continue
-        files.update({source: text for source, text in result.sources.items() if source not in files})
-        for finding in result.diagnostics:
-            if finding.severity is not Severity.ERROR:
-                continue  # said where the scenario itself is checked
-            if finding.span.file in result.sources and Path(finding.span.file).is_file():
-                bag.add(finding)
-                continue
-            meant = finding.suggestion
-            if meant is not None and os.path.isabs(meant):
-                meant = os.path.relpath(meant, experiment.folder)
-            bag.add(replace(finding, span=span, suggestion=meant))
+        _add_findings(result, span, experiment, bag, files)
     return played
+
+
+def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]) -> None:
+    """Check the files of phases that an experiment names."""
+    for path, place in experiment.curricula():
+        result, span = check(path), experiment.resolved.tree.value_span(place)
+        if result.has_errors:
+            _add_findings(result, span, experiment, bag, files)
+        elif result.curriculum is None:
+            kind = result.read().kind
+            bag.error("S108", f"this is a file of the kind `{kind}`; expected a curriculum", span)
+
+
+def _add_findings(
+    result: CheckResult,
+    span: Span,
+    experiment: LoadedExperiment,
+    bag: DiagnosticBag,
+    files: dict[str, Source],
+) -> None:
+    """The errors of something that an experiment names at `span`: at their places, or at the name if it is wrong."""
+    files.update({source: text for source, text in result.sources.items() if source not in files})
+    for finding in result.diagnostics:
+        if finding.severity is not Severity.ERROR:
+            continue  # said where the file itself is checked
+        if finding.span.file in result.sources and Path(finding.span.file).is_file():
+            bag.add(finding)
+            continue
+        meant = finding.suggestion
+        if meant is not None and os.path.isabs(meant):
+            meant = os.path.relpath(meant, experiment.folder)
+        bag.add(replace(finding, span=span, suggestion=meant))

@@ -10,7 +10,7 @@ from typing import Final
 
 from socialai_dsl.checking.loaded import Loaded, guided_options
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
-from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.reader import SUFFIXES, display_name
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
@@ -51,6 +51,17 @@ class LoadedExperiment:
                     seen.add(written)
                     yield from_anywhere(written, self.folder), written, self._place(cell, written, key)
 
+    def curricula(self) -> Iterator[tuple[str, DataPath]]:
+        """Each file of phases that is played by: its path from anywhere, and where it is named."""
+        named = {
+            cell.options["curriculum"]: cell.places["curriculum"]
+            for cells in self.cells.values()
+            for cell in cells
+            if is_phases(cell.options.get("curriculum"))
+        }
+        for name, place in named.items():
+            yield from_anywhere(name, self.folder), place
+
     def _place(self, cell: Cell, written: str, key: str) -> DataPath:
         place = cell.places[key]
         if key == "scenario":
@@ -60,8 +71,13 @@ class LoadedExperiment:
         return (*place, list(cell.tests).index(written)) if len(tests) == len(cell.tests) else place
 
 
+def is_phases(curriculum: str | None) -> bool:
+    """Whether a curriculum is a file of phases, and not a shipped one or a class."""
+    return curriculum is not None and curriculum.endswith(SUFFIXES)
+
+
 def from_anywhere(name: str, folder: Path) -> str:
-    """A scenario's name in a file in `folder`, as it is called from any working directory."""
+    """A name of a scenario or of another file in a file in `folder`, as it is called from any working directory."""
     base = name.partition("?")[0]
     if not looks_like_path(base.partition("+")[0]):
         return name

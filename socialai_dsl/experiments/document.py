@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere
+from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere, is_phases
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.experiments.folder import CHECKPOINTS
 from socialai_dsl.experiments.settings import resolved_config
@@ -189,7 +189,7 @@ def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
         "scenario": from_anywhere(cell.scenario, folder),
         "agent": _agent(cell.agent, folder),
         "frames": cell.frames if cell.trains else None,
-        "options": options_of(cell),
+        "options": _options(cell, folder),
         "tests": [from_anywhere(name, folder) for name in cell.tests],
         "reference": _reference(cell.reference),
         "test_references": {
@@ -198,6 +198,14 @@ def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
             if reference is not None
         },
     }
+
+
+def _options(cell: Cell, folder: Path) -> dict[str, Any]:
+    """`options_of`, as `socialai run` takes them from any folder."""
+    options = options_of(cell)
+    if is_phases(options.get("curriculum")):
+        options["curriculum"] = from_anywhere(options["curriculum"], folder)
+    return options
 
 
 def _agent(agent: str, folder: Path) -> str:
@@ -217,9 +225,12 @@ def _source_digest(loaded: LoadedExperiment) -> str:
 
 
 def _code_digests(cell: Cell, folder: Path) -> dict[str, str]:
-    """Of the files of the user's own classes, by option."""
+    """Of the files of the user's own classes, and of a curriculum's phases, by option."""
     config = config_of(cell).model_copy(update={"scenario": from_anywhere(cell.scenario, folder)})
-    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in config.own_files.items()}
+    files = dict(config.own_files)
+    if is_phases(config.curriculum):
+        files["curriculum"] = Path(from_anywhere(config.curriculum, folder))
+    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
 
 
 def _weights_digest(path: Path) -> str:

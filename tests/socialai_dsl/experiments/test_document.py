@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.checking.experiments import LoadedExperiment
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.document import config_of, differences, document_of
 from socialai_dsl.frontend import load, load_experiment
@@ -161,6 +162,21 @@ def test_a_changed_scenario_is_a_difference(tmp_path):
     kept = document(tmp_path, "")
     changed = kept | {"runs": [{**kept["runs"][0], "id": "0"}]}
     assert differences(changed, kept) == ["`one`: its scenario, its checkpoint or its code has changed since"]
+
+
+def test_phases_are_named_from_the_file_and_count_by_what_they_say(tmp_path, monkeypatch):
+    phases = tmp_path / "own" / "phases.yaml"
+    phases.parent.mkdir()
+    phases.write_text("curriculum: mine\nphases: [{}]\n")
+    monkeypatch.chdir(phases.parent)  # the folder of the command does not matter
+    made = document(tmp_path, ", curriculum: own/phases.yaml")
+    assert made["conditions"][0]["options"]["curriculum"] == str(phases)
+    assert document(tmp_path, ", curriculum: own/phases.yaml")["runs"] == made["runs"]
+    phases.write_text("curriculum: mine\nphases: [{play: [{weight: 2}]}]\n")
+    assert document(tmp_path, ", curriculum: own/phases.yaml")["runs"] != made["runs"]
+    phases.write_text("curriculum: mine\nphases: [{plya: []}]\n")
+    with pytest.raises(ScenarioError, match="unknown key `plya` in a phase"):
+        document(tmp_path, ", curriculum: own/phases.yaml")
 
 
 def test_changed_code_of_ones_own_is_another_run(tmp_path):
