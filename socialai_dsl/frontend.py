@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 from socialai_dsl.checking.curricula import check_curriculum
 from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment, with_scenarios
@@ -220,7 +220,7 @@ class CheckResult:
         suite: the suite with its members, if it is one and nothing is wrong with it.
         used: the places of the codes in comments that silenced a warning.
         experiment: the experiment with its conditions, if it is one and nothing is wrong with it.
-        curriculum: the curriculum, if it is one.
+        curriculum: the curriculum, if it is one and nothing is wrong with it.
     """
 
     name: str
@@ -292,10 +292,7 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(name)
-    resolved = result.read()
-    if result.experiment is None:
-        raise _other_kind(result, resolved, "an experiment")
-    return result.experiment
+    return result.experiment or _refuse(result, "an experiment")
 
 
 def load_curriculum(path: str | Path) -> Curriculum:
@@ -305,17 +302,14 @@ def load_curriculum(path: str | Path) -> Curriculum:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(path)
-    resolved = result.read()
-    if result.curriculum is None:
-        raise _other_kind(result, resolved, "a curriculum")
-    return result.curriculum
+    return result.curriculum or _refuse(result, "a curriculum")
 
 
-def _other_kind(result: CheckResult, resolved: ResolvedFile, expected: str) -> ScenarioError:
-    message = f"this is a file of the kind `{resolved.kind}`, not {expected}"
-    return ScenarioError(
-        [Diagnostic("S108", message, resolved.tree.key_span((resolved.kind,)))], result.sources
-    )
+def _refuse(result: CheckResult, expected: str) -> NoReturn:
+    """Raise what is wrong with a file, or that it is of another kind than expected."""
+    kind = result.read().kind
+    message = f"this is a file of the kind `{kind}`, not {expected}"
+    raise ScenarioError([Diagnostic("S108", message, result.read().tree.key_span((kind,)))], result.sources)
 
 
 def check(
@@ -346,9 +340,10 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
             CheckResult(name, None, None, tuple(said_once(bag)), dict(resolved.files), resolved, suite)
         )
     if resolved.kind == "curriculum":
-        curriculum = check_curriculum(resolved, bag)
-        files = dict(resolved.files)
-        return _sifted(CheckResult(name, None, None, tuple(bag), files, resolved, curriculum=curriculum))
+        phases = check_curriculum(resolved, bag)
+        files, found = dict(resolved.files), tuple(bag)
+        curriculum = None if bag.has_errors else phases
+        return _sifted(CheckResult(name, None, None, found, files, resolved, curriculum=curriculum))
     if resolved.kind == "experiment":
         experiment = check_experiment(resolved, bag)
         files = dict(resolved.files)

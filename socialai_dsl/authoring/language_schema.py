@@ -16,8 +16,14 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary
-from socialai_dsl.schema.curriculum import Curriculum
-from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.schema.files import (
+    CurriculumFile,
+    ExperimentFile,
+    NpcFile,
+    ScenarioFile,
+    SuiteFile,
+    VariantFile,
+)
 
 Schema = dict[str, Any]
 
@@ -30,7 +36,7 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
     "variant": (VariantFile,),
     "library": (ObjectLibrary, GrammarLibrary),
     "experiment": (ExperimentFile,),
-    "curriculum": (Curriculum,),
+    "curriculum": (CurriculumFile,),
 }
 """The key that says the kind of a file -> the models of such files."""
 

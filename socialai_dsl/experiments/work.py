@@ -105,7 +105,7 @@ def finished(run: Run) -> End | None:
 
 
 def cancel(run: Run) -> None:
-    """Give a run up: at once if no process works on it, else within a second by the worker."""
+    """Give a run up: at once if no process works on it, else by the worker, which lets it save first."""
     run.path.mkdir(parents=True, exist_ok=True)
     (run.path / CANCEL).touch()
     _settle(run, "cancelled")

@@ -10,7 +10,7 @@ from socialai_dsl.schema.scenario import ListOf, Model, Probability, Prose, Word
 from socialai_dsl.schema.suite import Labels, MemberName
 
 Weight = Annotated[
-    float, Field(ge=0), BeforeValidator(lambda value: float(value) if type(value) is int else value)
+    float, Field(ge=0, le=1e6), BeforeValidator(lambda value: float(value) if type(value) is int else value)
 ]
 
 

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pydantic import Field, JsonValue
 
+from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.scenario import Model, Npc, Prose, Scenario
 from socialai_dsl.schema.suite import Suite
@@ -35,6 +36,12 @@ class SuiteFile(Suite):
 
 class ExperimentFile(Experiment):
     """An experiment, perhaps built on another."""
+
+    extends: str | None = _EXTENDS
+
+
+class CurriculumFile(Curriculum):
+    """A curriculum, perhaps built on another."""
 
     extends: str | None = _EXTENDS
 

@@ -113,6 +113,13 @@ def test_all_mistakes_of_a_file_are_said_with_their_places(tmp_path: Path) -> No
     ]
 
 
+@pytest.mark.parametrize(("text", "code"), [("  - {play: [", "S001"), ("", "S104")])
+def test_files_without_phases(tmp_path: Path, text: str, code: str) -> None:
+    with pytest.raises(ScenarioError) as raised:
+        build_curriculum(str(written(tmp_path, text)), EXPERT)
+    assert [d.code for d in raised.value.diagnostics] == [code]
+
+
 @pytest.mark.parametrize("name", ["nowhere.yaml", "scenario.yaml"])
 def test_files_that_are_no_curriculum(tmp_path: Path, name: str) -> None:
     (tmp_path / "scenario.yaml").write_text("scenario: mine\nextends: talkitout\n")

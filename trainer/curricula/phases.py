@@ -26,6 +26,7 @@ class Phases:
             ]
             for p, phase in enumerate(plan.phases)
         ]
+        self._given = [[group.weight for group in phase.groups] for phase in plan.phases]
         self._digest = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
         self.phase = 0
         self._episodes = 0
@@ -47,9 +48,9 @@ class Phases:
 
     def weights(self) -> list[int]:
         """See `Curriculum.weights`."""
-        phase = self._plan.phases[self.phase]
-        given = [group.weight for group in phase.groups]
-        shares = [one.after(self._episodes) if isinstance(one, Ramp) else one for one in given]
+        shares = [
+            one.after(self._episodes) if isinstance(one, Ramp) else one for one in self._given[self.phase]
+        ]
         if sum(shares) <= 0:
             shares = [1.0] * len(shares)
         weights = [0] * len(self._natural)
