@@ -1,8 +1,9 @@
 """On a graphics card the same code runs: nothing mixes tensors of the computer with those of the card.
 
-There is no card where the tests run, so one is pretended; that the arithmetic is right there is not tested.
+Where there is no card, one is pretended; its arithmetic is tested where there is one.
 """
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -66,3 +67,19 @@ def test_the_pretended_card_refuses_what_a_real_one_does() -> None:
         with pytest.raises(TypeError, match="numpy"):
             there.numpy()
         assert np.array_equal(there.cpu().numpy(), [1, 1, 1])
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no graphics card here")
+@pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
+def test_a_real_card_learns_what_the_cpu_does(net: str, tmp_path: Path, small_config: Any) -> None:
+    """A card rounds otherwise, so the first update's figures are close, and later ones drift apart."""
+    figures = {}
+    for device in ("cpu", "cuda"):
+        config = small_config(net=net, bonus="lang", guide="script", frames=64 * 3, device=device)
+        path = train(config, EchoEnvs(8, chatter=0.3), tmp_path / device)
+        with open(tmp_path / device / "metrics.jsonl") as log:
+            first = json.loads(log.readline())
+        figures[device] = {name: first[name] for name in ("loss", "value_loss", "entropy", "imitation_loss")}
+        envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
+        assert evaluate(CheckpointPolicy.load(path, envs, device=device), envs, 8).episodes == 8
+    assert figures["cuda"] == pytest.approx(figures["cpu"], rel=1e-3, abs=1e-4)
