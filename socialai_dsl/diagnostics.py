@@ -89,6 +89,7 @@ CODES: Final[dict[str, str]] = {
     "S701": "settings for a condition that does not exist",
     "S702": "a seed given twice",
     "S703": "an agent that cannot be found",
+    "S704": "a script that the scenario does not have",
     # S8xx: what trying it out shows
     "S801": "a claim that does not hold",
     "W802": "something that never happens, or is not decided",

@@ -7,11 +7,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
 from socialai_dsl.checking.curricula import check_curriculum
-from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment, with_scenarios
-from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.experiments import (
+    LoadedExperiment,
+    check_experiment,
+    from_anywhere,
+    with_scenarios,
+)
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.checking.scenarios import (
     check_library,
     check_npc,
@@ -43,7 +48,9 @@ __all__ = [
     "LoadedExperiment",
     "LoadedScenario",
     "LoadedSuite",
+    "Scripted",
     "check",
+    "closest_script",
     "load",
     "load_curriculum",
     "load_experiment",
@@ -285,6 +292,36 @@ def _loaded(result: CheckResult) -> Loaded | None:
     )  # fmt: skip
 
 
+class Scripted(NamedTuple):
+    """A scenario in which the agent follows a frame; `loaded` is what `load(name)` returns."""
+
+    name: str
+    loaded: Loaded
+
+
+def closest_script(name: str, loaded: Loaded | None = None) -> Scripted:
+    """The scenario itself or its variant `oracle`, of which some members may have no script even there.
+
+    Args:
+        name: a path or the name of a shipped scenario, with variants and parameters.
+        loaded: the same, where it is loaded already.
+
+    Raises:
+        ScenarioError: the scenario, or its variant, has mistakes.
+    """
+    plain = Scripted(name, loaded or load(name))
+    if not unscripted(plain.loaded):
+        return plain
+    base, mark, parameters = name.partition("?")
+    oracle = f"{base}+oracle{mark}{parameters}"
+    try:
+        return Scripted(oracle, load(oracle))
+    except ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            return plain
+        raise
+
+
 def load_experiment(name: str | Path) -> LoadedExperiment:
     """An experiment's file, with its conditions.
 
@@ -351,6 +388,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
         if experiment is not None:
             played = _check_played(experiment, bag, files)
             _check_curricula(experiment, bag, files)
+            _check_scripts(experiment, played, bag, files)
             right = None if bag.has_errors else with_scenarios(experiment, played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
@@ -420,6 +458,25 @@ def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: di
         elif result.curriculum is None:
             kind = result.read().kind
             bag.error("S108", f"this is a file of the kind `{kind}`; expected a curriculum", span)
+
+
+def _check_scripts(
+    experiment: LoadedExperiment, played: Mapping[str, Loaded], bag: DiagnosticBag, files: dict[str, Source]
+) -> None:
+    """Check that the scenarios whose scripts are to play or to guide have one."""
+    for written, place in experiment.scripted():
+        if written not in played:
+            continue
+        span = experiment.resolved.tree.value_span(place)
+        try:
+            closest = closest_script(from_anywhere(written, experiment.folder), played[written])
+        except ScenarioError as error:
+            files.update({name: text for name, text in error.sources.items() if name not in files})
+            bag.extend(error.diagnostics)
+            continue
+        if lacking := unscripted(closest.loaded):
+            hint = "give it a variant `oracle` in which the agent follows a frame"
+            bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
 
 
 def _add_findings(

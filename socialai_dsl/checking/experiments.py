@@ -62,6 +62,22 @@ class LoadedExperiment:
         for name, place in named.items():
             yield from_anywhere(name, self.folder), place
 
+    def scripted(self) -> Iterator[tuple[str, DataPath]]:
+        """Each scenario whose own script plays or guides, by its name in the file, and what asks for the script."""
+        seen = set()
+        for cell in (cell for cells in self.cells.values() for cell in cells):
+            names: tuple[str, ...] = ()
+            if cell.agent == "oracle":
+                names, key = (cell.scenario, *cell.tests), "agent"
+            elif "guide" in cell.options:
+                names, key = (cell.scenario,) * (cell.options["guide"] == "script"), "guide"
+            elif cell.options.get("recipe") == "guided":
+                names, key = (cell.scenario,), "recipe"
+            for name in names:
+                if (name, cell.places[key]) not in seen:
+                    seen.add((name, cell.places[key]))
+                    yield name, cell.places[key]
+
     def _place(self, cell: Cell, written: str, key: str) -> DataPath:
         place = cell.places[key]
         if key == "scenario":

@@ -12,6 +12,7 @@ from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.cli.learnt import Learnt
 from socialai_dsl.cli.progress import TrainingProgress
 from socialai_dsl.cli.stopping import Stop
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.evaluation.model_card import FILE, model_card
@@ -33,7 +34,7 @@ def train_in(
     """Train in the run's folder and return the path of the final checkpoint."""
     try:
         return str(train_agent(config, loaded, program, folder, resume, stream))
-    except (UsageError, RunFailed):
+    except (ScenarioError, UsageError, RunFailed):
         _discard_unstarted(folder)
         raise
 

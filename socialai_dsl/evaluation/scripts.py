@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.analysis.search import Finding, search_rooms
 from socialai_dsl.checking.loaded import Loaded, unscripted
 from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import Scripted, closest_script
 
 _TOGETHER: Final = 250
 _ROOMS_SHOWN: Final = 12
@@ -25,13 +26,6 @@ VERDICTS: Final = {
 """What may be found of a room that the script does not solve -> the same in words."""
 
 
-class Scripted(NamedTuple):
-    """A scenario in which the agent follows a frame; `loaded` is what `load(name)` returns."""
-
-    name: str
-    loaded: Loaded
-
-
 def script_of(scenario: str, loaded: Loaded | None = None) -> Scripted | None:
     """The scenario itself if it scripts the agent, else its variant `oracle`; None if there is no script.
 
@@ -42,7 +36,7 @@ def script_of(scenario: str, loaded: Loaded | None = None) -> Scripted | None:
     Raises:
         ScenarioError: the scenario, or its variant, has mistakes.
     """
-    closest = _closest_script(scenario, loaded)
+    closest = closest_script(scenario, loaded)
     return None if unscripted(closest.loaded) else closest
 
 
@@ -52,27 +46,12 @@ def with_script(scenario: str, loaded: Loaded | None = None) -> Scripted:
     Raises:
         UsageError: there is no script.
     """
-    closest = _closest_script(scenario, loaded)
+    closest = closest_script(scenario, loaded)
     if lacking := unscripted(closest.loaded):
         raise UsageError(
             f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
         )
     return closest
-
-
-def _closest_script(scenario: str, loaded: Loaded | None) -> Scripted:
-    """The scenario itself or its variant `oracle`, of which some members may have no script even there."""
-    plain = Scripted(scenario, loaded or socialai_dsl.load(scenario))
-    if not unscripted(plain.loaded):
-        return plain
-    base, mark, parameters = scenario.partition("?")
-    name = f"{base}+oracle{mark}{parameters}"
-    try:
-        return Scripted(name, socialai_dsl.load(name))
-    except socialai_dsl.ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            return plain
-        raise
 
 
 @dataclass(frozen=True)

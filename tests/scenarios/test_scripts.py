@@ -7,6 +7,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
+from socialai_dsl.evaluation.scripts import script_of
 from tests.quick import one_in
 from tests.scenarios.playing import NOVEL
 
@@ -54,3 +55,10 @@ def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
     assert isinstance(scripted, sd.LoadedScenario)
     ceiling = 0.94 if name == "talkitout" else 0.99
     assert solved_by_script(sd.compile(scripted), Effort(300)).mean() >= ceiling
+
+
+@pytest.mark.parametrize(
+    "name", [f"{name}+as_coded" for name in (*PAPER, "social_env") if name != "help_as_helper"]
+)
+def test_a_script_also_plays_what_the_paper_s_tables_were_measured_on(name: str) -> None:
+    assert script_of(name) is not None

@@ -328,6 +328,14 @@ def test_a_scenario_with_mistakes_is_not_run(capsys: Capture) -> None:
     assert not Path("runs").exists()
 
 
+def test_a_curriculum_with_mistakes_leaves_no_folder(capsys: Capture) -> None:
+    Path("phases.yaml").write_text("curriculum: phases\nphases: []\n")
+    suite = str(DATA / "suites" / "school.yaml")
+    assert run_main([suite, *QUICK, "--curriculum", "phases.yaml", "--out", "here"]) == 1
+    assert "phases.yaml:2:" in capsys.readouterr().err
+    assert not Path("here").exists(), "the same command can be given again"
+
+
 def test_wandb_that_is_not_installed(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)
     assert run_main(["corridor.yaml", *QUICK, "--wandb", "project", "--out", "here"]) == 2
