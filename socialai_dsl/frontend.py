@@ -56,6 +56,7 @@ __all__ = [
     "load_experiment",
 ]
 
+
 UNUSED: Final = "W008"
 
 _IGNORE: Final = re.compile(r"#\s*socialai:\s*ignore\b(?:\s*=\s*(?P<codes>[^\s,]+(?:\s*,\s*[^\s,]+)*))?")
@@ -269,16 +270,8 @@ def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded
         ScenarioError: with all findings, if one of them is an error.
     """
     result = check(name, texts)
-    resolved, loaded = result.read(), _loaded(result)
-    if loaded is None:
-        kind = resolved.kind
-        what = "an abstract scenario, which others build on"
-        if kind != "scenario":
-            what = f"a file of the kind `{kind}`"
-        span = resolved.tree.key_span((kind,))
-        message = f"this is {what}; only a scenario can be run"
-        raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
-    return loaded
+    loaded = None if result.has_errors else _loaded(result)
+    return loaded or _refuse(result, "only a scenario or a suite can be run")
 
 
 def _loaded(result: CheckResult) -> Loaded | None:
@@ -329,7 +322,7 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(name)
-    return result.experiment or _refuse(result, "an experiment")
+    return result.experiment or _refuse(result, "expected an experiment")
 
 
 def load_curriculum(path: str | Path) -> Curriculum:
@@ -339,14 +332,23 @@ def load_curriculum(path: str | Path) -> Curriculum:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(path)
-    return result.curriculum or _refuse(result, "a curriculum")
+    return result.curriculum or _refuse(result, "expected a curriculum")
 
 
 def _refuse(result: CheckResult, expected: str) -> NoReturn:
     """Raise what is wrong with a file, or that it is of another kind than expected."""
+    resolved = result.read()
+    message = f"this is {_kind_of(result)}; {expected}"
+    span = resolved.tree.key_span((resolved.kind,))
+    raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
+
+
+def _kind_of(result: CheckResult) -> str:
+    """What a file that is not what was expected is, in words."""
     kind = result.read().kind
-    message = f"this is a file of the kind `{kind}`, not {expected}"
-    raise ScenarioError([Diagnostic("S108", message, result.read().tree.key_span((kind,)))], result.sources)
+    if kind == "scenario" and result.checked is None:
+        return "an abstract scenario, which others build on"
+    return f"a file of the kind `{kind}`"
 
 
 def check(
@@ -441,9 +443,8 @@ def _check_played(
             if loaded is not None:
                 played[written] = loaded
                 continue
-            kind = result.read().kind
-            what = "an abstract scenario" if kind == "scenario" else f"a file of the kind `{kind}`"
-            bag.error("S108", f"`{written}` is {what}; only a scenario or a suite can be run", span)
+            what = _kind_of(result)
+            bag.error("S108", f"this is {what}; only a scenario or a suite can be run", span)
             continue
         _add_findings(result, span, experiment, bag, files)
     return played
@@ -456,8 +457,7 @@ def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: di
         if result.has_errors:
             _add_findings(result, span, experiment, bag, files)
         elif result.curriculum is None:
-            kind = result.read().kind
-            bag.error("S108", f"this is a file of the kind `{kind}`; expected a curriculum", span)
+            bag.error("S108", f"this is {_kind_of(result)}; expected a curriculum", span)
 
 
 def _check_scripts(
