@@ -54,7 +54,7 @@ def measure_engine(plan: Plan, note: Callable[[str], None]) -> Report:
         note: told of each part that begins.
     """
     busy = load()
-    ours = Ours(plan.batches, plan.mixes, plan.repetitions, plan.seconds)
+    ours = Ours(plan.batches, plan.repetitions, plan.seconds)
     with on_cores(1):
         report = Report(machine(), busy, plan.repetitions, reference_speed(plan.repetitions))
         _measure_ours(report, ours, plan, note)

@@ -20,15 +20,12 @@ class Ours:
 
     Args:
         batches: environments stepped together.
-        mixes: how the agent's actions are generated: walk, random.
         repetitions: of each measurement.
         seconds: how long each repetition takes, about.
     """
 
-    def __init__(
-        self, batches: Sequence[int], mixes: Sequence[str], repetitions: int, seconds: float
-    ) -> None:
-        self._batches, self._mixes = batches, mixes
+    def __init__(self, batches: Sequence[int], repetitions: int, seconds: float) -> None:
+        self._batches = batches
         self._repetitions, self._seconds = repetitions, seconds
         self._allowed: dict[str, Allowed] = {}
 

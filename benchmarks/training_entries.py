@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -41,7 +41,6 @@ class Entry:
         words: how it encodes histories.
         start: called with a scenario and a number of threads; each `next` is one rollout with its update.
         precision: number type of the bulk of its arithmetic.
-        floor: frames/s by number of cores below which ratios to it are scaled.
     """
 
     name: str
@@ -53,7 +52,6 @@ class Entry:
     words: str
     start: Callable[[str, int], Iterator[Update | None]]
     precision: str = "float32"
-    floor: dict[int, float] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -150,4 +148,4 @@ def _peer(peer: Any) -> Entry:
 
     words = f"padded to {settings.words}" if settings.words else "to longest of batch"
     sizes = settings.num_envs, settings.horizon, settings.minibatches, settings.epochs
-    return Entry(peer.name, peer.what, *sizes, words, start, floor=peer.floor)
+    return Entry(peer.name, peer.what, *sizes, words, start)

@@ -30,11 +30,8 @@ def training_table(report: TrainingReport) -> str:
         lines += [_work(row) for row in own]
         lines.append("distinct: share of the frames computed in the update; rollout: its share of the time")
     if report.comparisons:
-        lines += ["", f"{'ours':<18} {'peer':<12} {'clock':>7} {'cpu':>7} {'floor':>6} {'scaled':>7}"]
+        lines += ["", f"{'ours':<18} {'peer':<12} {'clock':>7} {'cpu':>7}"]
         lines += [_comparison(comparison) for comparison in report.comparisons]
-        lines.append(
-            "scaled: the clock's ratio, with the floor in the place of a peer that is slower than it"
-        )
     else:
         lines += ["", "no peer was measured"]
     return "\n".join(lines)
@@ -60,8 +57,4 @@ def _work(row: Row) -> str:
 
 
 def _comparison(comparison: Comparison) -> str:
-    floor = "" if comparison.floor is None else f"{comparison.floor:,.0f}"
-    return (
-        f"{comparison.ours:<18} {comparison.peer:<12} {comparison.wall:>6.1f}x {comparison.cpu:>6.1f}x {floor:>6} "
-        f"{comparison.scaled:>6.1f}x"
-    )
+    return f"{comparison.ours:<18} {comparison.peer:<12} {comparison.wall:>6.1f}x {comparison.cpu:>6.1f}x"

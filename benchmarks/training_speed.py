@@ -70,16 +70,12 @@ class Comparison:
     Attributes:
         ours, peer: names.
         wall, cpu: ratio of the medians.
-        floor: frames/s the peer is expected to reach at least on the CPU it was set for; None if there is no such.
-        scaled: `wall`, but with the floor in the place of a peer that is slower.
     """
 
     ours: str
     peer: str
     wall: float
     cpu: float
-    floor: float | None
-    scaled: float
 
 
 @dataclass(frozen=True)
@@ -131,7 +127,6 @@ def measure_training(
             rows.append(_measure(entry, scenario, threads, seconds, repetitions))
             note(f"{entry.name}: {rows[-1].wall:,.0f} frames/s, {rows[-1].cpu:,.0f} per CPU second")
     torch.set_num_threads(before)
-    floors = {entry.name: entry.floor.get(threads) for entry in chosen}
     return TrainingReport(
         machine(),
         _versions(),
@@ -140,7 +135,7 @@ def measure_training(
         busy,
         reference,
         rows,
-        list(_compare(rows, floors)),
+        list(_compare(rows)),
     )
 
 
@@ -179,13 +174,12 @@ def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetiti
     )
 
 
-def _compare(rows: Sequence[Row], floors: dict[str, float | None]) -> Iterator[Comparison]:
+def _compare(rows: Sequence[Row]) -> Iterator[Comparison]:
     by_name = {row.name: row for row in rows}
     for ours, peer in _PAIRS:
         if ours in by_name and peer in by_name:
-            mine, other, floor = by_name[ours], by_name[peer], floors[peer]
-            scaled = mine.wall / max(other.wall, floor or 0.0)
-            yield Comparison(ours, peer, mine.wall / other.wall, mine.cpu / other.cpu, floor, scaled)
+            mine, other = by_name[ours], by_name[peer]
+            yield Comparison(ours, peer, mine.wall / other.wall, mine.cpu / other.cpu)
 
 
 def _versions() -> dict[str, str]:

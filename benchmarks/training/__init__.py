@@ -1,4 +1,4 @@
-"""The trainers that `socialai bench --train` runs beside ours, each with its settings."""
+"""The trainers that `python -m benchmarks --train` runs beside ours, each with its settings."""
 
 from __future__ import annotations
 
@@ -24,17 +24,13 @@ class Peer:
         what: who trains which network, in a few words.
         settings: sizes of its rollouts and how it treats histories.
         train: called with a vector environment and the settings; each `next` is one rollout with its update.
-        floor: frames/s by number of cores that it reaches at least on the CPU named in `FLOOR_CPU`.
     """
 
     name: str
     what: str
     settings: Settings
     train: Callable[[Any, Settings], Iterator[None]]
-    floor: dict[int, float]
 
-
-FLOOR_CPU = "Zen 4 server CPU, about 2.6 GHz"
 
 _PAPER = Settings(num_envs=16, horizon=40, minibatches=1, words=0)
 _CLEAN_PAPER = Settings(num_envs=16, horizon=40, minibatches=4, words=64)
@@ -57,12 +53,12 @@ def _recurrent(trunk: Callable[..., Any]) -> Callable[[Any, Settings], Iterator[
 
 
 PEERS: tuple[Peer, ...] = (
-    Peer("plain-loop", "the paper's loop, step by step", _PAPER, plain_loop.train, {1: 90.0, 2: 160.0}),
-    Peer("clean-paper", "CleanRL-style loop, paper's network", _CLEAN_PAPER, _clean(PaperTrunk), {}),
-    Peer("clean-fast", "CleanRL-style loop, fast's network", _CELLS, _clean(CellTrunk), {1: 300.0, 2: 300.0}),
+    Peer("plain-loop", "the paper's loop, step by step", _PAPER, plain_loop.train),
+    Peer("clean-paper", "CleanRL-style loop, paper's network", _CLEAN_PAPER, _clean(PaperTrunk)),
+    Peer("clean-fast", "CleanRL-style loop, fast's network", _CELLS, _clean(CellTrunk)),
 )
 if find_spec("sb3_contrib"):
     PEERS += (
-        Peer("sb3-paper", "RecurrentPPO, paper's network", _RECURRENT_PAPER, _recurrent(PaperTrunk), {}),
-        Peer("sb3-fast", "RecurrentPPO, fast's network", _RECURRENT_CELLS, _recurrent(CellTrunk), {}),
+        Peer("sb3-paper", "RecurrentPPO, paper's network", _RECURRENT_PAPER, _recurrent(PaperTrunk)),
+        Peer("sb3-fast", "RecurrentPPO, fast's network", _RECURRENT_CELLS, _recurrent(CellTrunk)),
     )

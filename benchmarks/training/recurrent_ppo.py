@@ -9,11 +9,11 @@ import numpy as np
 from gymnasium import spaces
 from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
 from benchmarks.training.networks import SIZE
 from benchmarks.training.settings import Settings, padded
+from socialai_dsl.sb3 import SB3VecEnv
 
 Trunk = Callable[[int, tuple[int, ...]], nn.Module]
 
@@ -26,7 +26,7 @@ def train(envs: Any, settings: Settings, trunk: Trunk) -> Iterator[None]:
     frames = settings.num_envs * settings.horizon
     model = RecurrentPPO(
         "MultiInputLstmPolicy",
-        _Adapter(envs, settings.words),
+        _Padded(envs, settings.words),
         learning_rate=7e-4,
         n_steps=settings.horizon,
         batch_size=frames // settings.minibatches,
@@ -61,41 +61,21 @@ class _Extractor(BaseFeaturesExtractor):
         return features
 
 
-class _Adapter(VecEnv):
-    """Our vector environment as Stable-Baselines3's; time-outs are terminal, histories have a fixed length."""
+class _Padded(SB3VecEnv):
+    """Histories have a fixed length, which the library asks for; time-outs are terminal, as for the other trainers."""
 
     def __init__(self, envs: Any, words: int) -> None:
-        self._envs, self._words = envs, words
+        super().__init__(envs)
+        self._words = words
         tokens = spaces.Box(0, len(envs.program.vocabulary) - 1, (words,), np.int16)
-        space = spaces.Dict(image=envs.single_observation_space["image"], tokens=tokens)
-        super().__init__(envs.num_envs, space, envs.single_action_space)
-        self._actions: Any = None
+        self.observation_space = spaces.Dict(image=envs.single_observation_space["image"], tokens=tokens)
 
     def reset(self) -> dict[str, Any]:
-        return self._shape(self._envs.reset(seed=0)[0])
-
-    def step_async(self, actions: Any) -> None:
-        self._actions = actions
+        return self._padded(super().reset())
 
     def step_wait(self) -> tuple[dict[str, Any], Any, Any, list[dict[str, Any]]]:
-        observation, reward, terminated, truncated, _ = self._envs.step(self._actions)
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        return self._shape(observation), reward.astype(np.float32), terminated | truncated, infos
+        observation, reward, done, _ = super().step_wait()
+        return self._padded(observation), reward, done, [{} for _ in done]
 
-    def _shape(self, observation: dict[str, Any]) -> dict[str, Any]:
-        return {"image": observation["image"], "tokens": padded(observation["tokens"], self._words)}
-
-    def close(self) -> None:
-        self._envs.close()
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        return [None for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        raise NotImplementedError("the environments of a comparison are not changed")
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        raise NotImplementedError("the environments of a comparison are not changed")
-
-    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        return [False for _ in self._get_indices(indices)]
+    def _padded(self, observation: dict[str, Any]) -> dict[str, Any]:
+        return {**observation, "tokens": padded(observation["tokens"], self._words)}

@@ -213,14 +213,14 @@ def test_actions_are_translated_by_spelling(scenario: str) -> None:
 def test_scenarios_with_other_slots_in_one_batch() -> None:
     """Grammars with one slot, with three, and with one of another name."""
     names = ["talkitout", "novel/reference_game", "novel/gossip"]
-    row = Ours([7], ["walk"], 1, 0.02).together(names, "walk")
+    row = Ours([7], 1, 0.02).together(names, "walk")
     assert (row.what, row.batch) == ("3 scenarios mixed", 7)
     assert row.speed.cpu > 0
 
 
 def test_programs_alone_and_together(scenario: str) -> None:
     names = {name: name for name in (scenario, "talkitout", "dance")}
-    alone, mixed = Ours([9], ["walk"], 1, 0.02).programs(names)
+    alone, mixed = Ours([9], 1, 0.02).programs(names)
     assert (alone.batch, mixed.batch) == (9, 9)
     assert alone.what == "3 programs (3 different), each alone"
     assert mixed.speed.cpu > 0
