@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         type=natural,
         metavar="N",
-        help=f"with --out: record up to N failures and N successes (default: {_RECORDED})",
+        help=f"with --out: record up to N successes and N failures (default: {_RECORDED})",
     )
     parser.add_argument(
         "--json", action="store_true", help="print a JSON array with one object for each scenario"

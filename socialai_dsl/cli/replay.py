@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=_RECORDED,
         metavar="N",
-        help=f"keep up to N failures and N successes (default: {_RECORDED})",
+        help=f"keep up to N successes and N failures (default: {_RECORDED})",
     )
     parser.add_argument(
         "--test-episode",
@@ -110,7 +110,7 @@ def _read(path: Path) -> "list[Trace]":
 
 
 def _played(arguments: argparse.Namespace) -> "list[Trace]":
-    """Test episodes of a run or a scenario: those that were asked for, or failures and successes.
+    """Test episodes of a run or a scenario: those that were asked for, or successes and failures.
 
     Raises:
         UsageError: a language model has not played one that was asked for.

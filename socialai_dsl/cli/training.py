@@ -177,7 +177,7 @@ _REPLAYED: Final = 5
 def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     """Film the first success, or the first episode if there is none, and where there are both, the first failure.
 
-    A page replays some failures and successes.
+    A page replays some successes and failures.
     """
     write_text(folder / REPLAY, replay_page(evaluation.traces(evaluation.to_replay(_REPLAYED))))
     success = evaluation.result.success

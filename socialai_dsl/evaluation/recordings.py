@@ -10,7 +10,7 @@ from socialai_dsl.run_folder import EPISODES, REPLAY, scenario_folder_name, writ
 
 
 def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
-    """Record up to `count` failures and as many successes, a page with them included, and list all episodes.
+    """Record up to `count` successes and as many failures, a page with them included, and list all episodes.
 
     Args:
         evaluation: what was played.
@@ -23,15 +23,15 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
     """
     place = folder / scenario_folder_name(evaluation.scenario)
     place.mkdir(parents=True, exist_ok=True)
-    for success in (False, True):
-        for number in evaluation.pick(success, count):
-            if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
-                continue
-            episode = evaluation.record(number, label or f"agent {evaluation.player.agent}")
-            name = f"{'success' if success else 'failure'}-{number:03d}"
-            write_text(place / f"{name}.txt", episode.transcript())
-            episode.save_film(place / f"{name}.gif")
-    if traces := evaluation.traces(evaluation.to_replay(count)):
+    replayed = evaluation.to_replay(count)
+    for number in replayed:
+        if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
+            continue
+        episode = evaluation.record(number, label or f"agent {evaluation.player.agent}")
+        name = f"{'success' if evaluation.result.success[number] else 'failure'}-{number:03d}"
+        write_text(place / f"{name}.txt", episode.transcript())
+        episode.save_film(place / f"{name}.gif")
+    if traces := evaluation.traces(replayed):
         write_text(place / REPLAY, replay_page(traces))
     write_text(place / EPISODES, _episodes(evaluation))
     return place

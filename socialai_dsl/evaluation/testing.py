@@ -118,8 +118,8 @@ class Evaluation:
             env.close()
 
     def to_replay(self, count: int) -> list[int]:
-        """Numbers of up to `count` failures and as many successes."""
-        return [number for success in (False, True) for number in self.pick(success, count)]
+        """Numbers of up to `count` successes and as many failures."""
+        return [number for success in (True, False) for number in self.pick(success, count)]
 
     def traces(self, numbers: Iterable[int]) -> list[Trace]:
         """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
