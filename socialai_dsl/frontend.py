@@ -56,7 +56,6 @@ __all__ = [
     "load_experiment",
 ]
 
-
 UNUSED: Final = "W008"
 
 _IGNORE: Final = re.compile(r"#\s*socialai:\s*ignore\b(?:\s*=\s*(?P<codes>[^\s,]+(?:\s*,\s*[^\s,]+)*))?")
@@ -286,14 +285,16 @@ def _loaded(result: CheckResult) -> Loaded | None:
 
 
 class Scripted(NamedTuple):
-    """A scenario in which the agent follows a frame; `loaded` is what `load(name)` returns."""
+    """A scenario or suite, as a rule with a script for the agent; `loaded` is what `load(name)` returns."""
 
     name: str
     loaded: Loaded
 
 
 def closest_script(name: str, loaded: Loaded | None = None) -> Scripted:
-    """The scenario itself or its variant `oracle`, of which some members may have no script even there.
+    """The scenario itself if its agent follows a frame, else its variant `oracle`, if it has one.
+
+    Some members of a suite may lack a script even there; `unscripted` names them.
 
     Args:
         name: a path or the name of a shipped scenario, with variants and parameters.
@@ -464,23 +465,23 @@ def _check_scripts(
     experiment: LoadedExperiment, played: Mapping[str, Loaded], bag: DiagnosticBag, files: dict[str, Source]
 ) -> None:
     """Check that the scenarios whose scripts are to play or to guide have one."""
-    for written, place in experiment.scripted():
+    for written, places in experiment.scripted().items():
         if written not in played:
             continue
-        span = experiment.resolved.tree.value_span(place)
+        spans = [experiment.resolved.tree.value_span(place) for place in places]
         try:
             closest = closest_script(from_anywhere(written, experiment.folder), played[written])
         except ScenarioError as error:
-            files.update({name: text for name, text in error.sources.items() if name not in files})
-            bag.extend(error.diagnostics)
+            _add_findings(error, spans[0], experiment, bag, files)
             continue
-        if lacking := unscripted(closest.loaded):
+        lacking = unscripted(closest.loaded)
+        for span in spans if lacking else ():
             hint = "give it a variant `oracle` in which the agent follows a frame"
             bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
 
 
 def _add_findings(
-    result: CheckResult,
+    result: CheckResult | ScenarioError,
     span: Span,
     experiment: LoadedExperiment,
     bag: DiagnosticBag,

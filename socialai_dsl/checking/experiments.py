@@ -62,21 +62,15 @@ class LoadedExperiment:
         for name, place in named.items():
             yield from_anywhere(name, self.folder), place
 
-    def scripted(self) -> Iterator[tuple[str, DataPath]]:
-        """Each scenario whose own script plays or guides, by its name in the file, and what asks for the script."""
-        seen = set()
+    def scripted(self) -> dict[str, list[DataPath]]:
+        """Each scenario whose own script is to play or to guide, by its name in the file: where that is asked for."""
+        asked: dict[str, list[DataPath]] = {}
         for cell in (cell for cells in self.cells.values() for cell in cells):
-            names: tuple[str, ...] = ()
-            if cell.agent == "oracle":
-                names, key = (cell.scenario, *cell.tests), "agent"
-            elif "guide" in cell.options:
-                names, key = (cell.scenario,) * (cell.options["guide"] == "script"), "guide"
-            elif cell.options.get("recipe") == "guided":
-                names, key = (cell.scenario,), "recipe"
-            for name in names:
-                if (name, cell.places[key]) not in seen:
-                    seen.add((name, cell.places[key]))
-                    yield name, cell.places[key]
+            key = _asks_for_script(cell)
+            if key is not None:
+                for name in (cell.scenario, *(cell.tests if key == "agent" else ())):
+                    asked.setdefault(name, []).append(cell.places[key])
+        return asked
 
     def _place(self, cell: Cell, written: str, key: str) -> DataPath:
         place = cell.places[key]
@@ -85,6 +79,15 @@ class LoadedExperiment:
         tests = self.resolved.tree.at(place).data
         assert isinstance(tests, list), "internal: the shape of tests was checked"
         return (*place, list(cell.tests).index(written)) if len(tests) == len(cell.tests) else place
+
+
+def _asks_for_script(cell: Cell) -> str | None:
+    """The setting by which a condition needs a script of its scenario, if it does."""
+    if cell.agent == "oracle":
+        return "agent"
+    key = "guide" if "guide" in cell.options else "recipe"
+    asks = cell.options.get(key) == ("script" if key == "guide" else "guided")
+    return key if cell.trains and asks else None
 
 
 def is_phases(curriculum: str | None) -> bool:

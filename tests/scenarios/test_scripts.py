@@ -57,8 +57,6 @@ def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
     assert solved_by_script(sd.compile(scripted), Effort(300)).mean() >= ceiling
 
 
-@pytest.mark.parametrize(
-    "name", [f"{name}+as_coded" for name in (*PAPER, "social_env") if name != "help_as_helper"]
-)
+@pytest.mark.parametrize("name", [f"{name}+as_coded" for name in (*PAPER, "social_env")])
 def test_a_script_also_plays_what_the_paper_s_tables_were_measured_on(name: str) -> None:
     assert script_of(name) is not None

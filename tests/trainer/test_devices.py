@@ -77,8 +77,7 @@ def test_a_real_card_learns_what_the_cpu_does(net: str, tmp_path: Path, small_co
     for device in ("cpu", "cuda"):
         config = small_config(net=net, bonus="lang", guide="script", frames=64 * 3, device=device)
         path = train(config, EchoEnvs(8, chatter=0.3), tmp_path / device)
-        with open(tmp_path / device / "metrics.jsonl") as log:
-            first = json.loads(log.readline())
+        first = json.loads((tmp_path / device / "metrics.jsonl").read_text().splitlines()[0])
         figures[device] = {name: first[name] for name in ("loss", "value_loss", "entropy", "imitation_loss")}
         envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
         assert evaluate(CheckpointPolicy.load(path, envs, device=device), envs, 8).episodes == 8
