@@ -27,7 +27,7 @@ from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
 
-_WHOLE = re.compile(r"\$([A-Za-z_]\w*)")
+_NAMED = re.compile(r"\$([A-Za-z_]\w*)")
 
 
 def put_parameters(
@@ -42,7 +42,7 @@ def put_parameters(
         bag: takes the findings.
     """
     for path, node in tree.walk():
-        match = _WHOLE.fullmatch(node.value) if isinstance(node.value, str) else None
+        match = _NAMED.fullmatch(node.value) if isinstance(node.value, str) else None
         if match is None or path[:1] == ("params",):
             continue
         name = match.group(1)
@@ -58,13 +58,14 @@ def put_parameters(
 def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Value]:
     """Parameter -> value: its default, or what was given behind `?`; reports S206."""
     declared = _declared(resolved)
+    _check_values(resolved, declared, bag)
     values: dict[str, Value] = {}
     for name, declaration in declared.items():
         default = _entry(declaration, "default") if isinstance(declaration, dict) else declaration
         choices = _entry(declaration, "values") if isinstance(declaration, dict) else None
         if default is not None and choices is not None:
             default = _chosen(name, default, choices, resolved, bag)
-        if name in resolved.params:
+        if name in resolved.params and _names_one(resolved.params[name], declared) is None:
             default = _given(name, default, choices, resolved, bag)
         if isinstance(default, int | bool | float | str):
             values[name] = default
@@ -74,6 +75,26 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
             message = f"`{resolved.name}` has no parameter `{name}`"
             bag.error("S206", message, resolved.param_span(name), **advice)
     return values
+
+
+def _check_values(resolved: ResolvedFile, declared: Container[str], bag: DiagnosticBag) -> None:
+    """Report values of parameters, written in the file or behind `?`, that name parameters themselves."""
+    params = resolved.tree.entry("params")
+    written = [(path[0], n.value, n.locate()) for path, n in params.walk() if path] if params is not None else []
+    given = [(name, text, resolved.param_span(name)) for name, text in resolved.params.items()]
+    for name, value, span in (*written, *given):
+        named = _names_one(value, declared)
+        if named is not None:
+            message = f"the value of `{name}` names the parameter `{named[1]}`, and a value names none"
+            instead = f", or `{named[0]}` where `${name}` is used" if named[1] != name else ""
+            place = span.shifted(named.start(), len(named[0]))
+            bag.error("S206", message, place, hint=f"write the value itself{instead}")
+
+
+def _names_one(value: Data, declared: Container[str]) -> re.Match[str] | None:
+    """The parameter that a value is or has in it; a text may have a `$` before other words."""
+    text = value if isinstance(value, str) else ""
+    return _NAMED.fullmatch(text) or next((m for m in _NAMED.finditer(text) if m[1] in declared), None)
 
 
 def _declared(resolved: ResolvedFile) -> dict[str, Data]:

@@ -159,10 +159,14 @@ class Findings:
         value = self.params[node.id]
         if isinstance(value, str):
             try:
-                return ast.moved(parse_expression(value), lambda _: node.at)
+                tree = parse_expression(value)
             except ParseProblem as problem:
                 message = f"the value `{value}` of `{node.id}` is not an expression: {problem}"
                 raise self.fail("S206", message, span) from None
+            if named := next((part for part in tree.walk() if isinstance(part, ast.Parameter)), None):
+                message = f"the value `{value}` of `{node.id}` names a parameter, `{named.id}`, and a value names none"
+                raise self.fail("S206", message, span)
+            return ast.moved(tree, lambda _: node.at)
         if isinstance(value, float):
             raise self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
         return ast.moved(self.expression((), value), lambda _: node.at)
