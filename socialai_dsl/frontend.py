@@ -63,6 +63,8 @@ _IGNORE: Final = re.compile(r"#\s*socialai:\s*ignore\b(?:\s*=\s*(?P<codes>[^\s,]
 
 _CODE: Final = re.compile(r"[^\s,]+")
 _WARNINGS: Final = [code for code in CODES if code.startswith("W") and code != UNUSED]
+_OF_TRIALS: Final = frozenset({"S801", "W802"})
+"""What only trying a scenario out shows, so that a comment about it is never idle."""
 
 
 @dataclass(frozen=True)
@@ -104,17 +106,32 @@ def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str
     ignores = [ignore for source in sources.values() for ignore in ignores_in(source)]
     if not ignores:
         return SiftedFindings(found, frozenset())
-    warned = {_key(d) for d in found if d.severity is Severity.WARNING}
-    used = [i for i in ignores if i.code in _WARNINGS and i.key in warned]
-    silenced = {ignore.key for ignore in used}
-    bag = DiagnosticBag(d for d in found if _key(d) not in silenced)
+    silenced = _silenced(found, ignores)
+    failed = {_key(d) for d in found if d.severity is Severity.ERROR}
+    bag = DiagnosticBag(d for d in found if _key(d) not in silenced or d.severity is Severity.ERROR)
     for ignore in ignores:
-        if ignore.code not in _WARNINGS:
+        if ignore.code not in CODES or ignore.code == UNUSED:
             bag.add(_no_warning(ignore))
-        elif ignore.span.file == judged and ignore not in used:
+        elif ignore.key in failed:
+            message = f"`{ignore.code}` is an error here, and only warnings can be ignored"
+            bag.warning(UNUSED, message, ignore.span)
+        elif ignore.span.file == judged and ignore.key not in silenced and ignore.code not in _OF_TRIALS:
             message = f"nothing on this line is warned of with `{ignore.code}`; delete the comment"
             bag.warning(UNUSED, message, ignore.span)
-    return SiftedFindings(tuple(bag), frozenset(ignore.span for ignore in used))
+    return SiftedFindings(tuple(bag), frozenset(i.span for i in ignores if i.key in silenced))
+
+
+def not_ignored(found: Iterable[Diagnostic], sources: Mapping[str, Source]) -> Iterator[Diagnostic]:
+    """The findings without the warnings that comments ignore."""
+    found = tuple(found)
+    silenced = _silenced(found, [ignore for source in sources.values() for ignore in ignores_in(source)])
+    return (d for d in found if _key(d) not in silenced or d.severity is Severity.ERROR)
+
+
+def _silenced(found: Sequence[Diagnostic], ignores: Iterable[Ignore]) -> frozenset[tuple[str, int, str]]:
+    """The keys of the warnings that comments ignore: whatever their code, but for the one about such comments."""
+    warned = {_key(d) for d in found if d.severity is Severity.WARNING and d.code != UNUSED}
+    return frozenset(ignore.key for ignore in ignores if ignore.key in warned)
 
 
 def ignores_in(source: Source) -> Iterator[Ignore]:
@@ -146,8 +163,6 @@ def _no_warning(ignore: Ignore) -> Diagnostic:
     near = None
     if not ignore.code:
         message = "this comment names no warning to ignore"
-    elif ignore.code in CODES and ignore.code != UNUSED:
-        message = f"`{ignore.code}` is an error, and only warnings can be ignored"
     elif ignore.code == UNUSED:
         message = f"`{UNUSED}` cannot be ignored: delete the comment it points at"
     else:

@@ -42,7 +42,7 @@ def check_scenario(
         texts: those that the scenario was loaded with.
     """
     place = loaded.resolved.tree.key_span(("outcome",))
-    report = ScenarioReport(called, effort.rooms, effort.seed, place)
+    report = ScenarioReport(called, effort.rooms, effort.seed, place, sources=loaded.resolved.files)
     said = 0
 
     def part(tasks: int) -> Effort:

@@ -1,7 +1,7 @@
 """What was found out about a scenario by trying it, as lines for people, objects for tools, and findings."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from statistics import median_high
 from typing import Any, Final
 
@@ -10,8 +10,9 @@ from socialai_dsl.analysis.coverage import Coverage
 from socialai_dsl.analysis.depth import Depth
 from socialai_dsl.analysis.reports import Report
 from socialai_dsl.diagnostics import Diagnostic, Severity
+from socialai_dsl.frontend import not_ignored
 from socialai_dsl.semantics.plans import PropertyPlan
-from socialai_dsl.source import Span
+from socialai_dsl.source import Source, Span
 
 
 @dataclass
@@ -23,6 +24,7 @@ class ScenarioReport:
         outcomes: where the outcomes are written.
         tried: its properties with what was found. coverage: what of it never happens, if that was tried.
         depth: what success takes, if that was tried.
+        sources: the files of the scenario, whose comments may ignore warnings.
         complete: whether the check has ended. interrupted: whether the user stopped it.
     """
 
@@ -33,11 +35,17 @@ class ScenarioReport:
     tried: tuple[tuple[PropertyPlan, Report], ...] = ()
     coverage: Coverage | None = None
     depth: Depth | None = None
+    sources: Mapping[str, Source] = field(default_factory=dict)
     complete: bool = False
     interrupted: bool = False
 
     def findings(self) -> Iterator[Diagnostic]:
-        """Failures as errors, undecided claims and parts that never happen as warnings, each at its place."""
+        """Failures as errors, undecided claims and parts that never happen as warnings, each at its place; without
+        the warnings that comments ignore.
+        """
+        return not_ignored(self._found(), self.sources)
+
+    def _found(self) -> Iterator[Diagnostic]:
         for plan, report in self.tried:
             hint = _listed(report.against) if report.against else None
             if report.verdict.value == "fails":
@@ -61,10 +69,11 @@ class ScenarioReport:
         return not (self.depth.steps or self.depth.undecided)
 
     def fails(self, strict: bool) -> bool:
-        """Whether a property fails or no room can be solved; with `strict` also what is undecided or never happens."""
-        verdicts = {report.verdict.value for _, report in self.tried}
-        missing = self.coverage is not None and bool(self.coverage.missing)
-        return "fails" in verdicts or self._is_hopeless or (strict and ("undecided" in verdicts or missing))
+        """Whether a property fails or no room can be solved; with `strict` also what is undecided or never happens,
+        unless a comment ignores it.
+        """
+        found = list(self.findings())
+        return any(d.severity is Severity.ERROR for d in found) or (strict and bool(found))
 
     def lines(self) -> Iterator[str]:
         """The report for people."""
@@ -75,7 +84,7 @@ class ScenarioReport:
                 numbers = ", ".join(map(str, report.against))
                 yield f"    at {_place(plan.span)}" + (f"; rooms {numbers}" if numbers else "")
         if self.coverage is not None:
-            yield from _coverage(self.coverage)
+            yield from _coverage(self.coverage, {finding.span for finding in self.findings()})
         if self.depth is not None:
             yield from _depth(self.depth, self.rooms)
         if self.complete:
@@ -132,12 +141,13 @@ class ScenarioReport:
         }
 
 
-def _coverage(found: Coverage) -> Iterator[str]:
+def _coverage(found: Coverage, told: Container[Span]) -> Iterator[str]:
     happened = found.parts - len(found.missing)
     yield f"  {happened} of {found.parts} states, steps, rules and outcomes happen in some room"
     why = "in none of these rooms" if found.proven else "in no room, as far as they were searched"
     for part in found.missing:
-        yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` happens {why}"
+        if part.span in told:
+            yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` happens {why}"
 
 
 def _depth(found: Depth, rooms: int) -> Iterator[str]:

@@ -80,7 +80,9 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
 def _check_values(resolved: ResolvedFile, declared: Container[str], bag: DiagnosticBag) -> None:
     """Report values of parameters, written in the file or behind `?`, that name parameters themselves."""
     params = resolved.tree.entry("params")
-    written = [(path[0], n.value, n.locate()) for path, n in params.walk() if path] if params is not None else []
+    written = (
+        [(path[0], n.value, n.locate()) for path, n in params.walk() if path] if params is not None else []
+    )
     given = [(name, text, resolved.param_span(name)) for name, text in resolved.params.items()]
     for name, value, span in (*written, *given):
         named = _names_one(value, declared)

@@ -53,7 +53,10 @@ def test_a_value_that_names_a_parameter_is_a_finding_where_it_is_written(tmp_pat
         ("both.yaml", "suite: both\nmembers: [base.yaml?n=1, base.yaml?n=$m]\n"),
         ("both.yaml", "suite: both\nmembers: [{scenario: base.yaml, set: {params.n: $m}}]\n"),
         ("grown.yaml", "suite: grown\ntree: {n: {a: {scenario: base.yaml?n=$m}}}\n"),
-        ("tried.yaml", "experiment: tried\nconditions:\n  - {name: a, frames: 100, scenario: 'base.yaml?n=$m'}\n"),
+        (
+            "tried.yaml",
+            "experiment: tried\nconditions:\n  - {name: a, frames: 100, scenario: 'base.yaml?n=$m'}\n",
+        ),
     ],
 )
 def test_so_is_one_that_another_file_or_a_name_gives(tmp_path: Path, name: str, text: str | None) -> None:
@@ -68,7 +71,9 @@ def test_a_text_may_have_a_dollar_sign(tmp_path: Path) -> None:
     params = 'n: 1, line: "It costs $much"'
     rule = "{states: {s: {then: [{hears: Hello there, say: $line}]}}}"
     text = BASE.replace("PARAMS", params) + f"frames: {{talk: {rule}}}\n"
-    (tmp_path / "base.yaml").write_text(text.replace("{agent", "{ann: {frame: talk}, agent"), encoding="utf-8")
+    (tmp_path / "base.yaml").write_text(
+        text.replace("{agent", "{ann: {frame: talk}, agent"), encoding="utf-8"
+    )
     assert check(tmp_path / "base.yaml").diagnostics == ()
 
 
