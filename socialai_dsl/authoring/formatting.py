@@ -14,11 +14,14 @@ from typing import Any, Final
 import yaml
 
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import YAML, read_document
 from socialai_dsl.source import Node, Source
 
 _INDENT: Final = 2
 _BREAK: Final = re.compile(r"\r\n|\r")
+_WHITE: Final = " \t"
+"""What YAML takes for blanks; other white space is text."""
+_SPACE: Final = _WHITE + "\n"
 
 
 def formatted(source: Source) -> str:
@@ -87,7 +90,7 @@ class _Layout:
 
     def text(self) -> str:
         """The text laid out."""
-        for token in yaml.scan(self._source, Loader=yaml.SafeLoader):
+        for token in yaml.scan(self._source, Loader=YAML):
             self._take(token)
         self._gap(len(self._source), None)
         if self._line:
@@ -144,7 +147,7 @@ class _Layout:
         start, end = token.start_mark.index, token.end_mark.index
         self._gap(start, token)
         raw = self._source[start:end]
-        indent = len(self._line) - len(self._line.lstrip())
+        indent = len(self._line) - len(self._line.lstrip(_WHITE))
         if isinstance(token, yaml.FlowMappingStartToken | yaml.FlowSequenceStartToken):
             self._flows.append(_Flow(len(self._line), indent))
         if isinstance(token, yaml.ScalarToken) and token.style in ("|", ">"):
@@ -164,21 +167,22 @@ class _Layout:
         inside = self._flows[-1].inside if self._flows else self._nested()
         self._lines.append(self._line + first)
         self._lines += [
-            " " * inside + line.lstrip(" \t") if line.strip(" \t") else "" for line in others[:-1]
+            " " * inside + line.lstrip(_WHITE) if line.strip(_WHITE) else "" for line in others[:-1]
         ]
-        self._line = " " * inside + others[-1].lstrip(" \t")
+        self._line = " " * inside + others[-1].lstrip(_WHITE)
 
     def _block_text(self, raw: str) -> None:
         """A text behind `|` or `>`, whose lines move together."""
         header, *lines = raw.split("\n")
-        self._lines.append(self._line + header.rstrip())
+        self._lines.append(self._line + header.rstrip(_WHITE))
         self._line = ""
         number = re.search(r"[1-9]", header.partition("#")[0])
         if number:
             old = (self._blocks[-1].old if self._blocks else 0) + int(number.group())
             new = (self._blocks[-1].new if self._blocks else 0) + int(number.group())
         else:
-            old = next((len(line) - len(line.lstrip(" ")) for line in lines if line.strip(" ")), 0)
+            blanks = (len(line) - len(line.lstrip(" ")) for line in lines if line.strip(" "))
+            old = next(blanks, max(map(len, lines), default=0))
             new = self._nested()
         moved = [" " * new + line[old:] if line[old:] else "" for line in lines]
         while moved and not moved[-1]:
@@ -202,7 +206,7 @@ class _Layout:
         flow = self._flows[-1] if self._flows else None
         if self._after_break:
             gap = "\n" + gap
-        elif isinstance(self._before, yaml.BlockEntryToken) and token is not None and not gap.strip():
+        elif isinstance(self._before, yaml.BlockEntryToken) and token is not None and not gap.strip(_SPACE):
             gap = " "  # what an entry is stands beside its `-`
         if flow is not None and flow.hanging is None:
             flow.hanging = "\n" in gap
@@ -214,11 +218,13 @@ class _Layout:
         behind, *lines = gap.split("\n")
         if token is not None:
             lines.pop()  # the blanks before the token
-        self._comment_behind(behind.strip(), start - len(gap) + len(behind) - len(behind.lstrip()))
+        self._comment_behind(
+            behind.strip(_WHITE), start - len(gap) + len(behind) - len(behind.lstrip(_WHITE))
+        )
         self._finish_line()
         indent = self._indent_of(token)
         for line in lines:
-            stripped = line.strip()
+            stripped = line.strip(_WHITE)
             if stripped:
                 self._lines.append(" " * self._comment_indent(line, token, indent) + stripped)
             elif self._lines and self._lines[-1]:
@@ -228,13 +234,13 @@ class _Layout:
 
     def _finish_line(self) -> None:
         if not self._after_break:
-            self._lines.append(self._line.rstrip())
+            self._lines.append(self._line.rstrip(_WHITE))
         self._line = ""
 
     def _comment_behind(self, comment: str, index: int) -> None:
         if comment:
             column = index - (self._source.rfind("\n", 0, index) + 1)
-            self._line = self._line.rstrip()
+            self._line = self._line.rstrip(_WHITE)
             self._line += " " * max(2, column - len(self._line)) + comment
 
     def _blank(self, token: Any) -> str:
@@ -263,7 +269,7 @@ class _Layout:
         """How far a comment on a line of its own is indented: with what follows, or with the block before it."""
         if self._flows:
             return following
-        column = len(line) - len(line.lstrip())
+        column = len(line) - len(line.lstrip(_WHITE))
         next_column = token.start_mark.column if token is not None else 0
         candidates = [block for block in self._opened_before if next_column < block.old <= column]
         return candidates[-1].new if candidates else following

@@ -36,9 +36,9 @@ def comments_of(document: Node) -> list[Comment]:
         line = match.group().rstrip("\r\n")
         column = _comment_in(line, begin, starts, ends)
         if column is not None:
-            comment = line[column:].rstrip()
+            comment = line[column:].rstrip(" \t")
             span = Span(document.source.name, number, column + 1, len(comment))
-            found.append(Comment(comment, span, not line[:column].strip()))
+            found.append(Comment(comment, span, not line[:column].strip(" \t")))
         begin = match.end()
     return found
 
@@ -49,7 +49,7 @@ def _comment_in(line: str, begin: int, starts: list[int], ends: list[int]) -> in
     while column >= 0:
         before = bisect_right(starts, begin + column) - 1
         inside = before >= 0 and begin + column < ends[before]
-        if not inside and (column == 0 or line[column - 1] in " \t"):
+        if not inside:
             return column
         column = line.find("#", column + 1)
     return None

@@ -322,7 +322,8 @@ def _kept(keys: list[str]) -> tuple[type, ...]:
 
 
 # Only the event stream of libyaml is used: its composer and PyYAML's are recursive and can be made to crash.
-_EventParser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+YAML: Final[Any] = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+"""The parser of every file; where tokens and events come from different ones, they disagree about tabs."""
 
 _TAG_DIRECTIVE = re.compile(r"^%TAG\b", re.MULTILINE)
 
@@ -362,7 +363,7 @@ def _parse(source: Source) -> Node:
 
 
 def _events(text: str) -> Iterator[Any]:
-    parser = _EventParser(text)
+    parser = YAML(text)
     try:
         while parser.check_event():
             yield parser.get_event()

@@ -1,5 +1,6 @@
 """The formatter changes white space alone, and nothing on a second run."""
 
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 
@@ -174,6 +175,11 @@ def test_what_ships_is_in_this_style(path: Path) -> None:
         ('{"a":1,"b":[]}', '{"a": 1, "b": []}\n'),
         ("- a\n-\n  # why\n  b: 1\n", "- a\n-\n  # why\n  b: 1\n"),
         ("a:\n# about b\n  b: 1\n", "a:\n  # about b\n  b: 1\n"),
+        ("a:\t1\t# tab\n", "a: 1  # tab\n"),
+        ("a:\t{b:\t1,\tc: 2\t}\t#\td\t\n", "a: {b: 1, c: 2}  #\td\n"),
+        ("a: [#b\n1]#c\n", "a: [  #b\n  1]  #c\n"),
+        ("a: \u3000 #b\n", "a: \u3000  #b\n"),
+        ("a: |\n   \nb: 1\n", "a: |\n\nb: 1\n"),
     ],
 )
 def test_small_files(text: str, expected: str) -> None:
@@ -218,6 +224,30 @@ def test_random_white_space(seed: int) -> None:
     random = Random(seed)
     path = random.choice([path for path in FILES if path.stat().st_size < 3_000])
     format_twice(untidied(path.read_text(encoding="utf-8"), random))
+
+
+HOSTILE = (
+    *("\t", " \t", "\n\t", "\t\n", "\r", "\r\n", "\u00a0", "\u3000", "\u2003", "\u200b", "'", "{", "]"),
+    *("#", "\t#", "#\t\n", " #x\t\n", ":\t", ",\t", "-\t", "\t:", "\t? ", "|\t#c\n"),
+)
+
+
+def broken(text: str, random: Random) -> str:
+    """A file with odd white space put where it may mean anything, or be a mistake."""
+    for _ in range(random.choice((1, 1, 2, 4))):
+        place = random.randrange(len(text) + 1)
+        text = text[:place] + random.choice(HOSTILE) + text[place:]
+    return text
+
+
+@pytest.mark.parametrize("seed", one_in(4, range(200), "formats many made-up files"))
+def test_hostile_white_space(seed: int) -> None:
+    """What can be read is laid out, whatever stands between its words; all else is a mistake of the author."""
+    random = Random(seed)
+    path = random.choice([path for path in FILES if path.stat().st_size < 3_000])
+    for text in (broken(path.read_text(encoding="utf-8"), random), broken(UNTIDY, random)):
+        with suppress(ScenarioError):
+            format_twice(text)
 
 
 @pytest.mark.parametrize("seed", one_in(4, range(120), "formats many made-up files"))
