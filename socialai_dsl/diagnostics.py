@@ -243,9 +243,13 @@ def advice_on(word: str, known: Iterable[str], otherwise: str) -> dict[str, str 
 
 
 @contextmanager
-def bounded_suggestions() -> Iterator[None]:
-    """Look for suggestions with a fixed effort only, however many words are misspelt and names are known."""
-    token = _effort.set(_Effort(_SUGGESTING))
+def bounded_suggestions(effort: int = 1_500_000) -> Iterator[None]:
+    """Look for suggestions with a fixed effort only, however many words are misspelt and names are known.
+
+    Args:
+        effort: how many pairs of letters are compared.
+    """
+    token = _effort.set(_Effort(effort))
     try:
         yield
     finally:
@@ -261,7 +265,6 @@ class _Effort:
 
 _effort: ContextVar[_Effort | None] = ContextVar("effort", default=None)
 
-_SUGGESTING: Final = 1_500_000
 _EFFORT_OF_A_LOOK: Final = 8
 _LONGEST_SUGGESTION: Final = 80
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import dropwhile
 from typing import Any, Final, Literal, NamedTuple, get_args
 
-from socialai_dsl.diagnostics import printable, suggested
+from socialai_dsl.diagnostics import bounded_suggestions, printable, suggested
+from socialai_dsl.llm.replies import conclusion, lines_of, mark, readable
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.vocabulary import NOUN, words
 
 Mode = Literal["text", "json", "tools"]
 """How a model gives its action: in a line of its reply, as a JSON object, or by calling tools."""
 
-_READ: Final = 20_000
-"""The most characters of a reply that are read, the last ones."""
 _QUOTED: Final = 80
+_ASIDE: Final = 400
+"""The most characters that a line can have beside the longest sentence and still be an action."""
+_EFFORT: Final = 50_000
+"""The pairs of letters that are compared to suggest a sentence, so that a suggestion takes milliseconds."""
 _MOST_SENTENCES: Final = 500
 """The most sentences that a JSON Schema lists; servers refuse longer lists."""
 
@@ -50,13 +53,18 @@ _SYNONYMS: Final = {
     "done": ("i am done", "i'm done"),
     _STANDING: ("stay", "wait", "stand still", "do nothing", "no movement", "noop", "stand", "silence"),
 }
-_SAYING: Final = frozenset("say says saying said speak ask tell utter".split())
+_SAYING: Final = frozenset("say saying speak ask tell utter".split())
 _FILLERS: Final = frozenset(
     "i i'll i'd will would want to let me my next action is move then now please and while also".split()
 )
+_ALTERNATIVES: Final = frozenset(
+    "or not instead otherwise else unless if rather but maybe perhaps either neither nor".split()
+)
+"""Words behind a sentence by which it may not be meant."""
+_SILENCE: Final = frozenset([(), ("none",), ("null",), ("nothing",), ("silence",)])
+"""The words that stand for no sentence where one can be given."""
 
-_THOUGHT: Final = re.compile(r"<(think|thinking|reasoning)>.*?(</\1>|\Z)", re.DOTALL | re.IGNORECASE)
-_MARK: Final = re.compile(r"(?<![\w\"'])act(?:ion)?[*_`]*\s*:[*_`]*", re.IGNORECASE)
+_MARK: Final = mark("act(?:ion)?")
 _QUOTATION: Final = re.compile(r"[\"“«]([^\"“”«»\n]{1,500})[\"”»]|(?<!\w)['‘]([^'‘’\n]{1,500})['’](?!\w)")
 
 
@@ -118,6 +126,9 @@ class ActionLanguage:
         for sentence in self._sentences:
             self._by_words.setdefault(tuple(words(sentence)), sentence)
         self._exact = set(self._sentences)
+        self._longest = _ASIDE + max(map(len, self._sentences), default=0)
+        moving = (said for said, action in self._movements.items() if action != _STANDING)
+        self._moving = {said[0] for said in moving if len(said) == 1}
 
     def instructions(self, mode: Mode) -> str:
         """The possible actions and utterances, and the form of a reply.
@@ -151,24 +162,28 @@ class ActionLanguage:
         """Read a reply of the modes `text` and `json`.
 
         What counts is the last JSON object or the last line marked `Act:`, whichever comes later; without either,
-        the last line, if it says nothing but an action. Case, quotes, punctuation and markdown do not count, nor
-        does what is written before.
+        the last line, if it says nothing but an action. Case, quotes, punctuation, markdown and the tokens of chat
+        templates do not count, nor do thoughts. Two actions that stand together and differ are refused.
         """
-        text = conclusion(reply)
-        if not text.strip():
-            return self._wrong("the reply was empty" if not reply.strip() else "the reply held no action")
-        candidates: list[tuple[int, str | dict[str, Any]]] = [*marked(text, _MARK), *objects(text)]
-        if candidates:
-            _, meant = max(candidates, key=lambda candidate: candidate[0])
-            return self._meaning(meant) if isinstance(meant, str) else self._arguments(meant)
-        lines = [line for line in text.splitlines() if line.strip(" `*_\t")]
-        return self._meaning(lines[-1]) if lines else self._wrong("the reply held no action")
+        text = readable(reply, "Act")
+        stated = conclusion(text, _MARK)
+        *others, meant = stated.statements or lines_of(text)[-2:] or [""]
+        if not meant:
+            return self._wrong("the reply held no action" if reply.strip() else "the reply was empty")
+        if stated.last_line:
+            others.append(stated.last_line)
+        parsed = self._meaning(meant) if isinstance(meant, str) else self._arguments(meant)
+        for other in others if parsed.action is not None else ():
+            action = self._understood(other) if isinstance(other, str) else self._arguments(other).action
+            if action not in (None, parsed.action):
+                return self._wrong(f"the reply held two actions, {_cited(other)} and {_cited(meant)}")
+        return parsed
 
     def parse_calls(self, calls: Sequence[ToolCall]) -> Parsed:
-        """Read the tools that a reply calls: the last movement and the last sentence count."""
+        """Read the tools that a reply calls: a movement, a sentence, or both; what differs is refused."""
         if not calls:
             return self._wrong("no tool was called")
-        movement = sentence = None
+        together = Action()
         for call in calls:
             try:
                 arguments = json.loads(call.arguments or "{}")
@@ -179,9 +194,11 @@ class ActionLanguage:
             parsed = self._arguments(arguments)
             if parsed.action is None:
                 return parsed
-            movement = parsed.action.movement or movement
-            sentence = parsed.action.sentence or sentence
-        return Parsed(Action(movement, sentence))
+            for before, now in zip(together, parsed.action, strict=True):
+                if None not in (before, now) and before != now:
+                    return self._wrong(f"the reply held two actions, {_cited(before)} and {_cited(now)}")
+            together = Action(*(before or now for before, now in zip(together, parsed.action, strict=True)))
+        return Parsed(together)
 
     def gbnf(self) -> str:
         """A grammar in llama.cpp's notation of the replies that `write` gives."""
@@ -253,45 +270,53 @@ class ActionLanguage:
         ]
 
     def _meaning(self, content: str) -> Parsed:
-        """What a piece of a reply says that is done: a movement, a sentence, or both."""
+        """What a piece of a reply says that is done, or what is wrong with it."""
+        action = self._understood(content)
+        return self._not_understood(content) if action is None else Parsed(action)
+
+    def _understood(self, content: str) -> Action | None:
+        """A movement, a sentence, or both; None if it is not plainly one action."""
+        if len(content) > self._longest:
+            return None
         bare = content.strip(" \t`*_\"'“”.,;!")
         if bare in self._exact and tuple(words(bare)) not in self._movements:
-            return Parsed(Action(None, bare))
-        quoted = self._with_quotation(content)
-        if quoted is not None:
-            return quoted
+            return Action(None, bare)
+        quoted = [(found, self._sentence(found[1] or found[2])) for found in _QUOTATION.finditer(content)]
+        if any(sentence is not None for _, sentence in quoted):
+            return self._with_quotations(content, quoted)
         said = _without_fillers(words(content))
         movement = self._movements.get(tuple(words(content))) or self._movements.get(tuple(_trimmed(said)))
         if movement:
-            return Parsed(_action(movement))
+            return _action(movement)
         for start in (0, 1):
             if said[start:] and (start == 0 or said[0] in _SAYING):
                 sentence = self._by_words.get(tuple(said[start:]))
                 if sentence is not None:
-                    return Parsed(Action(None, sentence))
-        both = self._both(said)
-        return both if both is not None else self._not_understood(content)
+                    return Action(None, sentence)
+        return self._both(said)
 
-    def _with_quotation(self, content: str) -> Parsed | None:
-        """Read `forward, say "Where is the exit"`; None where nothing that is quoted can be said."""
-        for match in _QUOTATION.finditer(content):
-            quoted = match[1] or match[2]
-            sentence = quoted if quoted in self._exact else self._by_words.get(tuple(words(quoted)))
-            if sentence is None:
-                continue
-            before = [
-                word for word in _without_fillers(words(content[: match.start()])) if word not in _SAYING
-            ]
-            after = _without_fillers(words(content[match.end() :]))
-            movement = self._movements.get(tuple(_trimmed(before)))
-            if before and movement is None:
-                return self._not_understood(content)
-            return Parsed(
-                Action(_action(movement or self._movements.get(tuple(after), _STANDING)).movement, sentence)
-            )
-        return None
+    def _sentence(self, text: str) -> str | None:
+        """The sentence that a text is; None if it cannot be said."""
+        return text if text in self._exact else self._by_words.get(tuple(words(text)))
 
-    def _both(self, said: Sequence[str]) -> Parsed | None:
+    def _with_quotations(
+        self, content: str, quoted: Sequence[tuple[re.Match[str], str | None]]
+    ) -> Action | None:
+        """Read `forward, say "Where is the exit"`; None where another sentence, movement or none may be meant."""
+        (first, sentence), (last, _) = quoted[0], quoted[-1]
+        if sentence is None or any(other != sentence for _, other in quoted):
+            return None
+        before = [word for word in _without_fillers(words(content[: first.start()])) if word not in _SAYING]
+        after = _trimmed(words(content[last.end() :]))
+        moves = [self._movements.get(tuple(_trimmed(before))), self._movements.get(tuple(after))]
+        if before and moves[0] is None:
+            return None
+        if after and moves[1] is None and not (_ALTERNATIVES | self._moving).isdisjoint(after):
+            return None
+        moved = {move for move in moves if move is not None} - {_STANDING}
+        return Action(next(iter(moved), None), sentence) if len(moved) <= 1 else None
+
+    def _both(self, said: Sequence[str]) -> Action | None:
         """A movement, then a sentence, or the other way round, without quotes."""
         for cut in range(len(said) - 1, 0, -1):
             for moved, rest in ((said[:cut], said[cut:]), (said[cut:], said[:cut])):
@@ -302,44 +327,62 @@ class ActionLanguage:
                 spoken = (spoken[1:] if spoken[0] in _SAYING else spoken)[:-1]
                 sentence = self._by_words.get(tuple(spoken)) or self._by_words.get(tuple(_trimmed(spoken)))
                 if sentence is not None:
-                    return Parsed(Action(_action(movement).movement, sentence))
+                    return Action(_action(movement).movement, sentence)
         return None
 
     def _arguments(self, given: Mapping[str, Any]) -> Parsed:
         """Read a JSON object: `move` and `say`, or the arguments of a tool."""
         if isinstance(inner := given.get("arguments", given.get("parameters")), dict):
             given = inner
-        moved = next(
-            (given[key] for key in ("move", "direction", "action", "movement") if given.get(key)), None
-        )
+        moves = [given[key] for key in ("move", "direction", "action", "movement") if given.get(key)]
         spoken = next((given[key] for key in ("say", "sentence", "utterance") if given.get(key)), None)
         if spoken is None and isinstance(given.get("template"), str):
-            spoken = given["template"]
-            for name in self._slots:
-                spoken = spoken.replace(f"<{name}>", str(given.get(name, "")))
-        movement = sentence = None
-        if moved is not None:
-            movement = self._movements.get(tuple(words(str(moved)[:_QUOTED])))
-            if movement is None:
-                return self._wrong(f"{_cited(moved)} is no movement")
-        if spoken is not None:
-            text = str(spoken)[: 10 * _QUOTED]
-            sentence = text if text in self._exact else self._by_words.get(tuple(words(text)))
-            if sentence is None:
-                return self._unsayable(text)
-        if moved is None and spoken is None and not {"move", "say"} & set(given):
+            spoken = self._filled(_text(given["template"]), given)
+        if not moves and spoken is None and not {"move", "say"} & set(given):
             return self._wrong("the object says neither what to do nor what to say")
-        return Parsed(Action(_action(movement or _STANDING).movement, sentence))
+        movement, sentence = _STANDING, None
+        if moves:
+            known = [self._movements.get(tuple(words(_text(move)))) for move in moves]
+            movement = next((move for move in known if move is not None), "")
+            if not movement:
+                return self._wrong(f"{_cited(moves[0])} is no movement")
+            if any(move not in (None, movement) for move in known):
+                return self._wrong(
+                    f"the object names several movements: {_cited(' and '.join(map(str, moves)))}"
+                )
+        if spoken is not None:
+            sentence = self._sentence(_text(spoken))
+            if sentence is None and tuple(words(_text(spoken, "?"))) not in _SILENCE:
+                return self._unsayable(str(spoken))
+        return Parsed(Action(_action(movement).movement, sentence))
+
+    def _filled(self, template: str, given: Mapping[str, Any]) -> str:
+        """A template with its slots filled as a call of a tool says."""
+        for name in self._slots:
+            template = template.replace(f"<{name}>", _text(given.get(name, "")))
+        return template
 
     def _not_understood(self, content: str) -> Parsed:
+        """Say why a piece of a reply is not plainly one action."""
+        if len(content) > self._longest:
+            return self._wrong(f"{_cited(content)} is too long for an action")
+        quoted = [found[1] or found[2] for found in _QUOTATION.finditer(content) if "{" not in content]
+        known = [sentence for sentence in map(self._sentence, quoted) if sentence is not None]
+        if len(set(known)) > 1:
+            return self._wrong(f"the reply held two sentences, {_cited(known[0])} and {_cited(known[-1])}")
+        if known and len(known) == len(quoted):
+            return self._wrong(f"{_cited(content)} is not plainly one action")
         said = _without_fillers(words(content))
-        spoken = (said[:1] and said[0] in _SAYING) or _QUOTATION.search(content)
+        spoken = quoted or (said and said[0] in _SAYING)
         return self._unsayable(content) if spoken else self._wrong(f"{_cited(content)} is no action")
 
     def _unsayable(self, text: str) -> Parsed:
-        quoted = next((match[1] or match[2] for match in _QUOTATION.finditer(text)), text)
+        """Say that a sentence cannot be said, and which one may be meant."""
+        quotations = (found[1] or found[2] for found in _QUOTATION.finditer(text))
+        quoted = next((one for one in quotations if self._sentence(one) is None), text)
         as_json = partial(json.dumps, ensure_ascii=False)
-        hint = suggested(quoted.strip(), self._sentences[:2000], quoted=as_json)
+        with bounded_suggestions(_EFFORT):
+            hint = suggested(quoted.strip(), self._sentences, quoted=as_json)
         return self._wrong(f"{_cited(quoted)} cannot be said{hint}")
 
     def _wrong(self, what: str) -> Parsed:
@@ -353,37 +396,9 @@ def _action(movement: str) -> Action:
     return Action(None if movement == _STANDING else movement)
 
 
-def conclusion(reply: str) -> str:
-    """The end of a reply, without its reasoning and what cannot be read."""
-    readable = "".join(c if c.isprintable() or c == "\n" else " " for c in reply[-_READ:])
-    return _THOUGHT.sub(" ", readable)
-
-
-def marked(text: str, mark: re.Pattern[str]) -> Iterator[tuple[int, str]]:
-    """The last line behind a mark that says something, and where it begins."""
-    for found in reversed(list(mark.finditer(text))):
-        for line in text[found.end() :].splitlines()[:4]:
-            if line.strip(" `*_\t"):
-                yield found.end(), line
-                return
-
-
-def objects(text: str) -> Iterator[tuple[int, dict[str, Any]]]:
-    """The last JSON object of a text, and where it begins."""
-    decoder = json.JSONDecoder()
-    end = len(text)
-    for _ in range(50):
-        end = text.rfind("{", 0, end)
-        if end < 0:
-            return
-        try:
-            found, _ = decoder.raw_decode(text[end:])
-        except (ValueError, RecursionError):
-            continue
-        # The arguments of a call are an object within an object: the outer one counts.
-        if isinstance(found, dict) and found and not text[:end].rstrip().endswith(":"):
-            yield end, found
-            return
+def _text(given: Any, otherwise: str = "") -> str:
+    """What was given, if it is a text that can be an action."""
+    return given[: 10 * _QUOTED] if isinstance(given, str) else otherwise
 
 
 def _without_fillers(said: Sequence[str]) -> list[str]:

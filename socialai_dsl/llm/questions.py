@@ -10,9 +10,10 @@ from typing import Any, Final
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.asking import Question
-from socialai_dsl.llm.actions import Mode, conclusion, marked, objects
+from socialai_dsl.llm.actions import Mode
+from socialai_dsl.llm.replies import conclusion, lines_of, mark, readable
 
-_MARK: Final = re.compile(r"(?<![\w\"'])answer[*_`]*\s*(?::|\bis\b:?)[*_`]*", re.IGNORECASE)
+_MARK: Final = mark("answer", r"(?:[:：﹕∶꞉]|\bis\b[:：]?)")
 _WORD: Final = re.compile(r"(?<!\w)-\d+|(?:[^\W_]|')+")
 
 
@@ -89,28 +90,27 @@ def read_answer(reply: str, answers: Sequence[str]) -> str | None:
     What counts is the last JSON object with an `answer` or the last line marked `Answer:`, whichever comes later;
     without either, the last line, and then the whole reply. Case, punctuation, markdown and further words do not count.
     """
-    text = conclusion(reply)
-    given = [*marked(text, _MARK)]
-    given += [(at, str(found["answer"])) for at, found in objects(text) if "answer" in found]
-    if given:
-        return _named(max(given)[1], answers)
-    lines = [line for line in text.splitlines() if line.strip(" `*_\t")]
-    found = (_named(part, answers) for part in (*lines[-1:], text))
+    text = readable(reply, "Answer")
+    stated = conclusion(text, _MARK, "answer").statements
+    if stated:
+        meant = stated[-1]
+        return _named(meant if isinstance(meant, str) else str(meant["answer"]), answers)
+    found = (_named(part, answers) for part in (*lines_of(text)[-1:], text))
     return next((answer for answer in found if answer is not None), None)
 
 
 def _named(text: str, answers: Sequence[str]) -> str | None:
     """The one answer that a text names; a shorter one within a longer one is not named."""
-    said = _words(text)
-    found: set[str] = set()
-    taken: set[int] = set()
-    for answer in sorted(answers, key=lambda answer: -len(_words(answer))):
-        wanted = _words(answer)
-        for start in range(len(said) - len(wanted) + 1 if wanted else 0):
-            span = range(start, start + len(wanted))
-            if said[start : span.stop] == wanted and taken.isdisjoint(span):
-                taken.update(span)
-                found.add(answer)
+    wanted = sorted(((_words(answer), answer) for answer in answers), key=lambda one: -len(one[0]))
+    beginning: dict[str, list[tuple[list[str], str]]] = {}
+    for spelt, answer in wanted:
+        if spelt:
+            beginning.setdefault(spelt[0], []).append((spelt, answer))
+    said, found, at = _words(text), set[str](), 0
+    while at < len(said):
+        here = [one for one in beginning.get(said[at], ()) if said[at : at + len(one[0])] == one[0]]
+        found |= {answer for _, answer in here[:1]}
+        at += len(here[0][0]) if here else 1
     if not found:
         found = {answer for answer in answers if answer.strip() == text.strip()}
     return found.pop() if len(found) == 1 else None

@@ -12,10 +12,26 @@ from hypothesis import strategies as st
 import socialai_dsl as sd
 from socialai_dsl.llm import Action, ActionLanguage
 from socialai_dsl.llm.actions import ToolCall
+from socialai_dsl.llm.questions import read_answer
 from socialai_dsl.loader.resolved import shipped_names
 
 LANGUAGE = ActionLanguage(sd.compile(sd.load("talkitout")))
 EXIT = "Where is the exit"
+OTHER = "How are you"
+
+TOKENS = ("</s>", "<|im_end|>", "<|eot_id|>", "<|return|>", "<end_of_turn>", "<｜end▁of▁sentence｜>")
+THOUGHTS = (
+    ("<think>", "</think>"),
+    ("<Thinking>", "</thinking >"),
+    ('<reasoning effort="high">', "</reasoning>"),
+    ("<analysis>", "</analysis>"),
+    ("<seed:think>", "</seed:think>"),
+    ("[THINK]", "[/THINK]"),
+    ("◁think▷", "◁/think▷"),
+    ("<|START_THINKING|>", "<|END_THINKING|>"),
+    ("<|channel>thought\n", "<channel|>"),
+    ("<|channel|>analysis<|message|>", "<|end|><|start|>assistant<|channel|>final<|message|>"),
+)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +80,27 @@ EXIT = "Where is the exit"
         (f'Sure! {{"action": "Left", "say": "{EXIT}?"}} Good luck.', Action("left", EXIT)),
         ('{"name": "move", "arguments": {"direction": "left"}}', Action("left")),
         ('{"template": "Open <noun>", "noun": "sesame"}', Action(None, "Open sesame")),
-        ('Act: left, or rather {"move": "right", "say": ""}', Action("right")),
+        ("Act：left", Action("left")),
+        ('"Act: left"', Action("left")),
+        ("I see a wall. Act: left", Action("left")),
+        ("My final action: left", Action("left")),
+        ("Act: left\n**Act: turn left**", Action("left")),
+        ('Act: {"move": "left", "say": null}', Action("left")),
+        ('{"plan": "Act: right", "move": "left"}', Action("left")),
+        ('{"move": "left", "say": "none"}', Action("left")),
+        (f'Act: say "{EXIT}" and wait for an answer', Action(None, EXIT)),
+        ("My last action: right\nAct: left", Action("left")),
+        ("<answer>Act: left</answer>", Action("left")),
+        ("<answer>\nleft\n</answer>", Action("left")),
+        ("So \\boxed{left}", Action("left")),
+        ("Act: <b>left</b>", Action("left")),
+        ('<tool_call>{"name": "move", "arguments": {"direction": "left"}}</tool_call>', Action("left")),
+        *((f"Act: left{token}", Action("left")) for token in TOKENS),
+        ("<|im_start|>assistant\nAct: left<|im_end|>\n<|im_start|>user\nAct: right", Action("left")),
+        *((f"Hm. {opens}Act: right{closes} Act: left", Action("left")) for opens, closes in THOUGHTS),
+        ("The prompt began this. Act: right</think>left", Action("left")),
+        ("<think>" + "Act: right\n" * 5000 + "</think>Act: left", Action("left")),
+        ("analysisShall I? Act: rightassistantfinalAct: left", Action("left")),
     ],
 )
 def test_what_models_write_is_understood(reply: str, action: Action) -> None:
@@ -89,11 +125,36 @@ def test_what_models_write_is_understood(reply: str, action: Action) -> None:
             '"Where is the exist" cannot be said; did you mean "Where is the exit"?',
         ),
         ("Act: say please let me out", "cannot be said"),
-        (f'Act: fly, say "{EXIT}"', "cannot be said"),
+        (f'Act: fly, say "{EXIT}"', "is not plainly one action"),
         ('{"move": "fly", "say": null}', '"fly" is no movement'),
         ('{"move": "left", "say": "Open up"}', '"Open up" cannot be said'),
         ('{"mood": "good"}', "the object says neither what to do nor what to say"),
-        ("x" * 1000, f'"{"x" * 80}…" is no action'),
+        ("x" * 1000, f'"{"x" * 80}…" is too long for an action'),
+        *((f"{opens}Shall I? Act: left", "the reply held no action") for opens, _ in THOUGHTS),
+        ("analysisShall I? Act: left", "the reply held no action"),
+        ("Act: left</think>", "the reply held no action"),
+        ("Act: left\nAct: right", 'the reply held two actions, "left" and "right"'),
+        ("1. Act: left\n2. Act: forward", "the reply held two actions"),
+        ("Act: left. Act: right", "the reply held two actions"),
+        ("Act: left\nforward", "the reply held two actions"),
+        (f'Act: left\nsay "{EXIT}"', "the reply held two actions"),
+        ("left\nright", "the reply held two actions"),
+        ('{"move": "left"}\n{"move": "right"}', "the reply held two actions"),
+        ('{"move": "left", "direction": "right"}', "the object names several movements"),
+        ('Act: left, or rather {"move": "right", "say": ""}', "is no action"),
+        ("Act: left or right", '"left or right" is no action'),
+        ("<answer>left or right</answer>", '"left or right" is no action'),
+        (f'say "{EXIT}" or "{OTHER}"', f'the reply held two sentences, "{EXIT}" and "{OTHER}"'),
+        (f'Act: say "{EXIT}", not "{OTHER}"', "the reply held two sentences"),
+        (f'Act: say "{EXIT}" or go left', "is not plainly one action"),
+        (f'Act: left, say "{EXIT}", then right', "is not plainly one action"),
+        (f'Act: do not say "{EXIT}"', "is not plainly one action"),
+        (f'She said "{EXIT}"', "is not plainly one action"),
+        (f'I said "{EXIT}"', "is not plainly one action"),
+        ("My last action: left", '"My last action: left" is no action'),
+        ("Previous action: left. It failed.", "is no action"),
+        ("I could do Act: left", "is no action"),
+        ('{"move": ["left"]}', "is no movement"),
     ],
 )
 def test_what_is_not_understood_is_answered_with_what_is_possible(reply: str, wrong: str) -> None:
@@ -127,9 +188,11 @@ def test_tools_of_one_reply_make_one_action() -> None:
     ask = ("say", {"template": "Where is <noun>", "noun": "the exit"})
     assert parse(("move", {"direction": "left"})).action == Action("left")
     assert parse(("move", {"direction": "left"}), ask).action == Action("left", EXIT)
-    assert parse(("move", {"direction": "left"}), ask, ("move", {"direction": "right"})).action == Action(
-        "right", EXIT
+    assert parse(("move", {"direction": "left"}), ask, ("move", {"direction": "left"})).action == Action(
+        "left", EXIT
     )
+    different = parse(("move", {"direction": "left"}), ask, ("move", {"direction": "right"}))
+    assert 'the reply held two actions, "left" and "right"' in different.error
     assert "no tool was called" in parse().error
     assert '"fly" with "{}" is no call of a tool' in parse(("fly", {})).error
     assert '"up" is no movement' in parse(("move", {"direction": "up"})).error
@@ -146,8 +209,58 @@ def test_the_grammar_names_every_word() -> None:
     assert '"the trash can"' in grammar
 
 
-@given(st.text())
-@settings(max_examples=100)
-def test_any_text_is_read_without_an_error(reply: str) -> None:
+PIECES = [
+    *("Act: ", "act", "Action:", "：", "left", "right", "none", "or", "say ", EXIT, OTHER, "my last "),
+    *(
+        '"',
+        "'",
+        "“",
+        "”",
+        "{",
+        "}",
+        '{"move": "left"}',
+        '{"say": ["',
+        "[",
+        "]",
+        "<",
+        ">",
+        "/",
+        "|",
+        "\\boxed{",
+    ),
+    *("\n", "\r", " ", "**", "```", "\u2028", "\x1b[2J", "\ud800", "e\u0301", "😀", "<answer>", "</answer>"),
+    *(mark for pair in THOUGHTS for mark in pair),
+    *TOKENS,
+]
+
+
+@given(st.lists(st.sampled_from(PIECES) | st.text(max_size=5)).map("".join) | st.text())
+@settings(max_examples=500, deadline=None)
+def test_any_text_is_an_action_that_can_be_done_or_is_refused_with_a_reason(reply: str) -> None:
     action, error = LANGUAGE.parse(reply)
     assert (action is None) == bool(error)
+    if action is not None:
+        assert action.movement in (None, "left", "right", "forward", "pickup", "drop", "toggle", "done")
+        assert action.sentence is None or LANGUAGE.parse(LANGUAGE.write(action)).action == action
+    assert error.isprintable()
+    assert read_answer(reply, ("left", EXIT)) in (None, "left", EXIT)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.sampled_from(PIECES),
+    lambda inner: (
+        st.lists(inner) | st.dictionaries(st.sampled_from(["move", "say", "template", "noun"]), inner)
+    ),
+    max_leaves=8,
+)
+
+
+@given(JSON, st.sampled_from(["move", "say", "fly", ""]))
+@settings(max_examples=200, deadline=None)
+def test_any_object_and_any_call_likewise(found: Any, name: str) -> None:
+    for parsed in (
+        LANGUAGE.parse(json.dumps(found)),
+        LANGUAGE.parse_calls([ToolCall(name, json.dumps(found))]),
+    ):
+        assert (parsed.action is None) == bool(parsed.error)
+        assert parsed.error.isprintable()

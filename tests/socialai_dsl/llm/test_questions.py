@@ -39,6 +39,11 @@ COLORS = ("red", "green", "dark green")
         ("Act: left", None),
         ("", None),
         ("redgreen", None),
+        ("<answer>red</answer>", "red"),
+        ("Answer：red<|im_end|>", "red"),
+        ("[THINK]Answer: green[/THINK]Answer: red", "red"),
+        ("<analysis>Answer: red", None),
+        ("<think>" + "Answer: green. " * 500 + "</think>\nred", "red"),
     ],
 )
 def test_replies_are_read_as_models_write_them(reply: str, given: str | None) -> None:
