@@ -31,9 +31,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--history",
         type=positive,
-        default=16,
         metavar="N",
-        help="number of observations in a request (default: 16)",
+        help="number of observations in a request (default: the whole episode)",
     )
     group.add_argument("--temperature", type=float, metavar="X", help="temperature (default: the server's)")
     group.add_argument(

@@ -24,7 +24,7 @@ class ModelOptions:
         base_url: of an OpenAI-compatible interface, up to `/v1`; None: OpenAI's.
         key_from: the environment variable with the key.
         style: of observations. mode: how the model gives its actions.
-        history: observations in a request.
+        history: observations in a request; None: the whole episode.
         temperature, max_tokens: of replies; None: the server's.
         on_invalid: whether a reply without an action passes the turn, is asked for again, or ends the episode.
         goal: what the model is told of the aim.
@@ -40,7 +40,7 @@ class ModelOptions:
     key_from: str = "OPENAI_API_KEY"
     style: Literal["prose", "grid", "json"] = "prose"
     mode: Literal["text", "json", "tools"] = "text"
-    history: int = 16
+    history: int | None = None
     temperature: float | None = None
     max_tokens: int | None = None
     on_invalid: Literal["noop", "retry", "fail"] = "noop"
@@ -86,7 +86,9 @@ class Player:
     def manner(self) -> str:
         """How actions come about, in a phrase; empty where there is nothing to say."""
         if self.options is not None:
-            return f"{self.options.style} and {self.options.mode}, {self.options.history} observations"
+            history = self.options.history
+            shown = "the whole episode" if history is None else f"{history} observation{'s' * (history > 1)}"
+            return f"{self.options.style} and {self.options.mode}, {shown}"
         if self.agent in ("oracle", "human"):
             return ""
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"

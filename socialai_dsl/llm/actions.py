@@ -6,7 +6,8 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
-from itertools import dropwhile
+from heapq import nlargest
+from itertools import dropwhile, islice
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 from socialai_dsl.diagnostics import bounded_suggestions, printable, suggested
@@ -20,8 +21,9 @@ Mode = Literal["text", "json", "tools"]
 _QUOTED: Final = 80
 _ASIDE: Final = 400
 """The most characters that a line can have beside the longest sentence and still be an action."""
-_EFFORT: Final = 50_000
-"""The pairs of letters that are compared to suggest a sentence, so that a suggestion takes milliseconds."""
+_COMPARED, _SUGGESTED, _EFFORT = 2000, 60, 50_000
+"""The sentences whose words are compared with what cannot be said, those of them whose letters are, and the pairs of
+letters: a suggestion takes milliseconds."""
 _MOST_SENTENCES: Final = 500
 """The most sentences that a JSON Schema lists; servers refuse longer lists."""
 
@@ -381,8 +383,14 @@ class ActionLanguage:
         quotations = (found[1] or found[2] for found in _QUOTATION.finditer(text))
         quoted = next((one for one in quotations if self._sentence(one) is None), text)
         as_json = partial(json.dumps, ensure_ascii=False)
+        said = set(words(quoted[: 10 * _QUOTED]))
+        alike = nlargest(
+            _SUGGESTED,
+            islice(self._by_words.items(), _COMPARED),
+            key=lambda known: len(said.intersection(known[0])),
+        )
         with bounded_suggestions(_EFFORT):
-            hint = suggested(quoted.strip(), self._sentences, quoted=as_json)
+            hint = suggested(quoted.strip(), (sentence for _, sentence in alike), quoted=as_json)
         return self._wrong(f"{_cited(quoted)} cannot be said{hint}")
 
     def _wrong(self, what: str) -> Parsed:

@@ -7,12 +7,13 @@ from typing import Any, Final, Literal
 
 from inspect_ai import Task, task
 from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.model import ChatMessageSystem, ChatMessageUser, get_model
+from inspect_ai.model import ChatMessage, ChatMessageSystem, ChatMessageUser, get_model
 from inspect_ai.scorer import Score, Scorer, Target, mean, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from socialai_dsl.envs.factory import playable_of
 from socialai_dsl.llm.episode import Episode, OnInvalid
+from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.view import Style
 
 _RESULT: Final = "result"
@@ -24,7 +25,7 @@ def scenario(
     episodes: int = 50,
     style: Style = "prose",
     mode: Literal["text", "json"] = "text",
-    history: int = 16,
+    history: int | None = WHOLE,
     on_invalid: OnInvalid = "noop",
     goal: str = "",
 ) -> Task:
@@ -35,7 +36,7 @@ def scenario(
         episodes: how many; the common test set has 500.
         style: how observations are written, see `TextView`.
         mode: how actions are given, see `ActionLanguage`.
-        history: how many observations the model is shown, the present one included.
+        history: how many observations the model is shown, the present one included; None: the whole episode.
         on_invalid: what a reply without an action does, see `Episode`.
         goal: what the instructions say of the aim; nothing by default.
 
@@ -43,8 +44,9 @@ def scenario(
         ScenarioError: the scenario does not exist, or has mistakes.
         ValueError: an argument is not what was expected.
     """
-    if episodes < 1 or history < 1:
-        raise ValueError(f"got {episodes} episodes and a history of {history}, expected at least 1 of both")
+    if episodes < 1:
+        raise ValueError(f"episodes: got {episodes}, expected at least 1")
+    left_out((), history)  # a limit that is none is told before anything is played
     program = playable_of(scenario)
     options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid, "goal": goal}
     beginning = Episode(program, **options)
@@ -66,12 +68,12 @@ def scenario(
 
 
 @solver
-def player(episode_maker: Any, history: int = 16) -> Solver:
+def player(episode_maker: Any, history: int | None = WHOLE) -> Solver:
     """Lets the model play the sample's episode to its end.
 
     Args:
         episode_maker: gives an `Episode` of its own to each sample.
-        history: how many observations a request holds.
+        history: how many observations a request holds; None: all.
     """
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
@@ -81,7 +83,7 @@ def player(episode_maker: Any, history: int = 16) -> Solver:
         state.store.set(_RESULT, asdict(episode.result()))
         done = False
         while not done:
-            output = await get_model().generate([state.messages[0], *state.messages[1:][1 - 2 * history :]])
+            output = await get_model().generate(_shown(state.messages, history))
             turn = episode.step(output.completion)
             done = turn.done
             state.output = output
@@ -91,6 +93,14 @@ def player(episode_maker: Any, history: int = 16) -> Solver:
         return state
 
     return solve
+
+
+def _shown(messages: list[ChatMessage], history: int | None) -> list[ChatMessage]:
+    """The instructions, then observations and replies in turn, without those beyond the limit."""
+    instructions, *turns = messages
+    count, told = left_out([turn.text for turn in turns[:-1:2]], history)
+    first, *others = turns[2 * count :]
+    return [instructions, ChatMessageUser(content=told + first.text), *others]
 
 
 @scorer(

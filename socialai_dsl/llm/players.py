@@ -19,6 +19,7 @@ from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import Episode, EpisodeResult, OnInvalid, Reply, Turn
+from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
@@ -36,7 +37,7 @@ class Manner:
 
     Attributes:
         style, mode, on_invalid, goal: see `Episode`.
-        history: how many observations a request holds, the present one included.
+        history: how many observations a request holds, the present one included; None: the whole episode.
         grammar: whether replies are held to a grammar, which llama.cpp's server understands.
         probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
             kept like other messages, or not at all.
@@ -46,7 +47,7 @@ class Manner:
     mode: Mode = "text"
     on_invalid: OnInvalid = "noop"
     goal: str = ""
-    history: int = 16
+    history: int | None = WHOLE
     grammar: bool = False
     probes: Probing = "apart"
 
@@ -297,17 +298,17 @@ class Conversation:
         return bool(self._episode.result().ending) and self._episode.question is None
 
     def messages(self) -> list[Mapping[str, Any]]:
-        """The instructions, the last exchanges, and what is seen now, perhaps with the question of a probe."""
+        """The instructions, the exchanges so far, and what is seen now, perhaps with the question of a probe."""
         question = self._episode.question
-        kept = self._exchanges[max(0, len(self._exchanges) - self._manner.history + 1) :]
-        return [
-            {"role": "system", "content": self._episode.instructions},
-            *(message for exchange in kept for message in exchange),
-            {
-                "role": "user",
-                "content": self._text if question is None else f"{self._text}\n\n{self._put(question)}",
-            },
+        text = self._text if question is None else f"{self._text}\n\n{self._put(question)}"
+        earlier = [str(exchange[0]["content"]) for exchange in self._exchanges]
+        count, told = left_out(earlier, self._manner.history)
+        shown = [
+            *(message for exchange in self._exchanges[count:] for message in exchange),
+            {"role": "user", "content": text},
         ]
+        first = {**shown[0], "content": f"{told}{shown[0]['content']}"}
+        return [{"role": "system", "content": self._episode.instructions}, first, *shown[1:]]
 
     def constraints(self) -> dict[str, Any]:
         """The constraints of a request on the form of the reply."""
