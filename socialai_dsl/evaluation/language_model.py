@@ -4,6 +4,7 @@ import os
 import re
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
@@ -19,7 +20,7 @@ from socialai_dsl.envs.asking import Asker, probe_names
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.evaluation.episodes import EvalResult
 from socialai_dsl.evaluation.players import MODEL_PREFIX, ModelOptions
-from socialai_dsl.llm.episode import INVALID
+from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.questions import score
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import Ending
@@ -145,6 +146,10 @@ def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
             f"{parts.hostname} asks for a key, and the environment has none in {options.key_from}; "
             "export it, or name another variable with --key-from"
         )
+    if not (key.strip().isascii() and key.strip().isprintable()):
+        raise UsageError(
+            f"--key-from: {options.key_from} holds more than the letters, digits and signs of a key"
+        )
     model = agent.removeprefix(MODEL_PREFIX)
     if not model:
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
@@ -184,8 +189,8 @@ def _outcome(
     played: "Sequence[PlayedEpisode]", program: Playable, probes: dict[str, Any] | None = None
 ) -> ModelEpisodes:
     results = [episode.result for episode in played]
-    invalid = any(result.ending == INVALID for result in results)
-    names = [*program.outcomes, *([INVALID] if invalid else [])]
+    cut_short = [name for name in CUT_SHORT if any(result.ending == name for result in results)]
+    names = [*program.outcomes, *cut_short]
     rules = {
         name: sum(episode.rules.get(name, 0) for episode in played) / len(played) for name in played[0].rules
     }
@@ -197,7 +202,7 @@ def _outcome(
         tuple(names),
         rules,
     )
-    more = [Ending(INVALID, False, "a reply without an action")] if invalid else []
+    more = [Ending(name, False, CUT_SHORT[name]) for name in cut_short]
     actions = {episode.number: episode.actions for episode in played}
     replies = {episode.number: episode.replies for episode in played}
     return ModelEpisodes(result, actions, replies, more, _figures(played) | (probes or {}))
@@ -210,12 +215,16 @@ def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:
     usage = sum((episode.usage for episode in played), Usage())
     replies = sum(episode.result.replies for episode in played)
     invalid = sum(episode.result.invalid for episode in played)
+    stops = sum((Counter(episode.stops) for episode in played), Counter[str]())
     return {
         "replies": replies,
         "invalid_replies": invalid,
         "invalid_rate": invalid / max(replies, 1),
+        "stopped_replies": sum(episode.result.stopped for episode in played),
+        "stops": dict(sorted(stops.items())),
         "prompt_tokens": usage.prompt,
         "completion_tokens": usage.completion,
+        "reasoning_tokens": usage.reasoning,
         "tokens_estimated": usage.estimated,
         "cost": usage.cost,
     }

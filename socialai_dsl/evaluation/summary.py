@@ -41,6 +41,10 @@ def _model_rows(figures: Mapping[str, Any]) -> list[Row]:
         ("invalid", f"{figures['invalid_rate']:.1%} of {figures['replies']:,} replies"),
         ("tokens", tokens + (", estimated" if figures["tokens_estimated"] else "")),
     ]
+    if figures.get("stops"):
+        told = ", ".join(f"{name} {count:,}" for name, count in figures["stops"].items())
+        without = f"{figures['stopped_replies']:,} of them without an action, apart from the invalid ones"
+        rows.insert(1, ("stopped", f"{told}; {without}"))
     return rows + ([("cost", f"${figures['cost']:.4f}")] if figures["cost"] is not None else [])
 
 

@@ -19,7 +19,7 @@ from socialai_dsl.evaluation.export import SCENARIO
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
 from socialai_dsl.evaluation.players import Player, folder_of, make_policy, named_agent, require_trainer
 from socialai_dsl.evaluation.scripts import with_script
-from socialai_dsl.llm.episode import INVALID
+from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 from socialai_dsl.replay import Thought, Trace, trace_of
 from socialai_dsl.replay.document import Outcome
@@ -91,8 +91,8 @@ class Evaluation:
         return sorted(rounds[:count])
 
     def is_cut_short(self, number: int) -> bool:
-        """Whether an answer without an action ended the episode."""
-        return bool(self.result.names[self.result.outcome[number]] == INVALID)
+        """Whether something else than a step ended the episode, such as an answer without an action."""
+        return self.result.names[self.result.outcome[number]] in CUT_SHORT
 
     def record(self, number: int, label: str) -> RecordedEpisode:
         """Play one of the episodes once more, for people to look at.

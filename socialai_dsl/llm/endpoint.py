@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from email.utils import parsedate_to_datetime
+from math import isfinite
 from time import time
 from typing import Any, Final
 
@@ -15,6 +17,7 @@ import httpx
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.llm.actions import ToolCall
+from socialai_dsl.llm.completion import UNREADABLE, Completion, Stop, read_completion, read_error
 
 OPENAI: Final = "https://api.openai.com/v1"
 Message = Mapping[str, Any]
@@ -28,12 +31,32 @@ _PASSING: Final = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 529})
 _LOST: Final = (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError)
 """A connection that was there and broke."""
 _CONNECT_SECONDS: Final = 15.0
+_REFUSING: Final = frozenset({400, 413, 422, 500})
+"""Statuses with which servers refuse a conversation that they cannot take."""
+_FULL: Final = re.compile(
+    r"context[ _-]?(?:length|size|window|limit)|maximum (?:model|prompt|input|sequence) length|max_model_len"
+    r"|(?:prompt|input|request|conversation)\b.{0,40} (?:is )?too (?:long|large)\b.{0,20}(?:token|context|\Z)"
+    r"|too many (?:input )?tokens|longer than the (?:model|maximum)|exceeds? the (?:model|maximum number of tokens)"
+    r"|input token count|must have less than \d+ tokens|inputs? tokens \+|reduce the length of the messages",
+    re.IGNORECASE,
+)
+"""How servers say that a conversation is longer than the model's context."""
+_RATE: Final = re.compile(r"rate.?limit|per (?:minute|day)|quota", re.IGNORECASE)
+_FILTERED: Final = re.compile(
+    r"content_(?:policy|filter)|content management policy|ResponsibleAI", re.IGNORECASE
+)
 _MOST_BYTES: Final = 4_000_000
+_UNREAD: Final = 2
+"""How often a completion without a message is asked for again before it counts as the answer."""
 _CITED: Final = 200
 
 
 class EndpointError(Exception):
     """The endpoint does not answer, or refuses; the message says in one line what was tried and what came of it."""
+
+
+class ContextFull(EndpointError):  # noqa: N818 - it says what was found
+    """A conversation is longer than the model's context."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +65,7 @@ class Usage:
 
     Attributes:
         prompt, completion: tokens. cost: in US dollars; None if prices are not known.
+        reasoning: those tokens of completions that are thoughts, as far as the server counts them.
         estimated: whether the server did not say how many tokens there were, so that four characters count as one.
     """
 
@@ -49,6 +73,7 @@ class Usage:
     completion: int = 0
     cost: float | None = None
     estimated: bool = False
+    reasoning: int = 0
 
     @property
     def tokens(self) -> int:
@@ -62,16 +87,26 @@ class Usage:
             self.completion + other.completion,
             sum(costs) if costs else None,
             self.estimated or other.estimated,
+            self.reasoning + other.reasoning,
         )
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A model's answer: text, the tools that it calls, and the usage."""
+    """A model's answer.
+
+    Attributes:
+        text: the reply. calls: the tools that it calls. usage: what it took.
+        reasoning: thoughts that the server keeps apart from the reply.
+        stop: why it ended before its end. reason: the server's own word for how it ended.
+    """
 
     text: str
-    calls: tuple[ToolCall, ...]
-    usage: Usage
+    calls: tuple[ToolCall, ...] = ()
+    usage: Usage = field(default_factory=Usage)
+    reasoning: str = ""
+    stop: Stop = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,9 +134,16 @@ class Endpoint:
         return f"{self.base_url.rstrip('/')}/chat/completions"
 
     def client(self) -> httpx.AsyncClient:
-        """Connections for many requests; to be closed."""
+        """Connections for many requests; to be closed.
+
+        Raises:
+            EndpointError: the proxy that the environment names cannot be used.
+        """
         headers = {"Authorization": f"Bearer {self.key}"} if self.key else {}
-        return httpx.AsyncClient(headers=headers, timeout=httpx.Timeout(None, connect=_CONNECT_SECONDS))
+        try:
+            return httpx.AsyncClient(headers=headers, timeout=httpx.Timeout(None, connect=_CONNECT_SECONDS))
+        except (ImportError, ValueError, httpx.InvalidURL) as error:
+            raise self._failure(f"the proxy of the environment cannot be used ({error})") from None
 
     async def ask(
         self,
@@ -122,12 +164,15 @@ class Endpoint:
             known: whether the endpoint has answered before. If not, its address is probably wrong when nothing that
                 could be an answer comes back twice.
 
+        A completion without a message, or one that a filter held back, is an answer with a `stop`.
+
         Raises:
+            ContextFull: the conversation is longer than the model's context.
             EndpointError: there was no answer, or a refusal.
         """
         body = {"model": self.model, "messages": list(messages), **more}
         body |= {name: value for name, value in self.options.items() if value is not None}
-        what, wait, strange = "", 0.0, 0
+        what, wait, strange, unread = "", 0.0, 0, 0
         for attempt in range(_TRIES):
             if attempt:
                 if strange == 2 and not known:
@@ -148,11 +193,17 @@ class Endpoint:
                 what = f"no connection ({str(error) or type(error).__name__})"
                 strange += not isinstance(error, _LOST)
                 continue
+            refused = _refusal(status, content) if status in _REFUSING else None
             if status == httpx.codes.OK:
-                answer = self._answer(content, messages)
-                if answer is not None:
-                    return answer
-                what, strange = f"the answer is no completion: {_cited(content)}", strange + 1
+                found = _completion(content)
+                unread += found is UNREADABLE
+                if found is not None and (found is not UNREADABLE or unread > _UNREAD):
+                    return self._answer(found, content, messages)
+                what, strange = f"the answer is no completion: {_cited(content)}", strange + (found is None)
+            elif refused == "context":
+                raise ContextFull(str(self._failure(f"status {status}: {_cited(content)}")))
+            elif refused is not None:
+                return self._answer(Completion("", stop=refused), content, messages)
             elif status in _PASSING:
                 what, wait = f"status {status}: {_cited(content)}", _retry_after(headers)
             else:
@@ -171,40 +222,36 @@ class Endpoint:
                     break
             return response.status_code, response.headers, content
 
-    def _answer(self, content: bytes, messages: Sequence[Message]) -> Answer | None:
-        """What a completion holds; None if it is none."""
-        try:
-            found = json.loads(content)
-            message = found["choices"][0]["message"]
-            text = message.get("content") or message.get("refusal") or ""
-            calls = tuple(
-                ToolCall(call["function"]["name"], call["function"]["arguments"])
-                for call in message.get("tool_calls") or ()
-            )
-            usage = found.get("usage") or {}
-            counts = usage.get("prompt_tokens"), usage.get("completion_tokens")
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            return None
-        if not isinstance(text, str) or not all(isinstance(part, str) for call in calls for part in call):
-            return None
-        prompt, completion = (count if isinstance(count, int) and count >= 0 else None for count in counts)
+    def _answer(self, found: Completion, content: bytes, messages: Sequence[Message]) -> Answer:
+        """A completion with what it took; without a count four characters are a token."""
+        prompt, completion = found.prompt_tokens, found.completion_tokens
         estimated = prompt is None or completion is None
         if prompt is None or completion is None:
             prompt, completion = len(json.dumps(messages)) // 4, len(content) // 4
-        return Answer(
-            text, calls, Usage(prompt, completion, self._cost(usage, prompt, completion), estimated)
-        )
-
-    def _cost(self, usage: Mapping[str, Any], prompt: int, completion: int) -> float | None:
-        """US dollars: by the prices given, else as the server says."""
+        cost = found.cost
         if self.prices is not None:
-            return (prompt * self.prices[0] + completion * self.prices[1]) / 1e6
-        told = usage.get("cost")
-        return float(told) if isinstance(told, int | float) and told >= 0 else None
+            cost = (prompt * self.prices[0] + completion * self.prices[1]) / 1e6
+        usage = Usage(prompt, completion, cost, estimated, found.reasoning_tokens or 0)
+        return Answer(found.text, found.calls, usage, found.reasoning, found.stop, found.reason)
 
     def _failure(self, what: str) -> EndpointError:
         text = f"model {self.model!r} at {self.address}: {what}"
         return EndpointError(printable(text.replace(self.key, "***") if self.key else text))
+
+
+def _completion(content: bytes) -> Completion | None:
+    """The completion that was sent; one that goes on beyond all measure was too long."""
+    if len(content) > _MOST_BYTES and content.lstrip()[:1] == b"{":
+        return Completion("", stop="length")
+    return read_completion(content)
+
+
+def _refusal(status: int, content: bytes) -> Stop | None:
+    """Whether a conversation is refused because it is too long, or because of what it says; None for other reasons."""
+    said = " ".join(read_error(content)).strip() or content[:1000].decode(errors="replace")
+    if _FULL.search(said) and not _RATE.search(said):
+        return "context"
+    return "content_filter" if status == httpx.codes.BAD_REQUEST and _FILTERED.search(said) else None
 
 
 def _retry_after(headers: httpx.Headers) -> float:
@@ -215,17 +262,13 @@ def _retry_after(headers: httpx.Headers) -> float:
     except ValueError:
         try:
             wait = parsedate_to_datetime(given).timestamp() - time()
-        except ValueError:
+        except (ValueError, TypeError, OverflowError):
             return 0.0
-    return min(max(wait, 0.0), _LONGEST_WAIT)
+    return min(max(wait, 0.0), _LONGEST_WAIT) if isfinite(wait) else 0.0
 
 
 def _cited(content: bytes) -> str:
     """What a server said, in one line."""
-    try:
-        found = json.loads(content)
-        text = str(found["error"]["message"])
-    except (ValueError, LookupError, TypeError, RecursionError):
-        text = content[: 4 * _CITED].decode(errors="replace")
+    text = read_error(content)[0] or content[: 4 * _CITED].decode(errors="replace")
     text = " ".join(text.split())
     return (text if len(text) <= _CITED else f"{text[:_CITED]}…") or "nothing"

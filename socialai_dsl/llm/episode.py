@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -13,7 +13,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.factory import Scenario
-from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, Parsed, ToolCall
+from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import Style, TextView
 from socialai_dsl.program_suite import outcome_name
@@ -25,7 +25,20 @@ Reply = str | Sequence[ToolCall]
 """What a model answers: text, or the tools that it calls."""
 
 INVALID: Final = "invalid reply"
-"""How an episode ends that an invalid reply ends."""
+STOPPED: Final = "reply cut off"
+CONTEXT: Final = "context full"
+CUT_SHORT: Final = {
+    INVALID: "a reply without an action",
+    STOPPED: "a reply without an action, which the server cut off or held back",
+    CONTEXT: "a conversation longer than the model's context",
+}
+"""How episodes end that no step ends, with what ended them."""
+_STOPS: Final = {
+    "length": "the server cut your reply off, since it was too long, before it held an action",
+    "content_filter": "a filter of the server held your reply back",
+    "unreadable": "the server sent no reply",
+}
+"""What a model is told of replies that the server ended. Its own refusals are its own mistakes."""
 
 _TRIES: Final = 3
 
@@ -55,11 +68,12 @@ class EpisodeResult:
 
     Attributes:
         success: whether it ended in success.
-        ending: the outcome, a name of `program.outcomes`, or `INVALID`; empty while the episode goes on.
+        ending: the outcome, a name of `program.outcomes` or of `CUT_SHORT`; empty while the episode goes on.
         total: undiscounted sum of the rewards.
         steps: number of steps played.
         replies: number of replies read.
-        invalid: number of replies without an action.
+        invalid: number of replies without an action that the model itself ended.
+        stopped: number of replies without an action that the server cut off or held back.
     """
 
     success: bool = False
@@ -68,6 +82,7 @@ class EpisodeResult:
     steps: int = 0
     replies: int = 0
     invalid: int = 0
+    stopped: int = 0
 
 
 class Episode:
@@ -138,11 +153,13 @@ class Episode:
         self._text = self.view.observe(observation, info)
         return self._text
 
-    def step(self, reply: Reply) -> Turn:
+    def step(self, reply: Reply, stop: str = "") -> Turn:
         """Play the action of a reply.
 
         Args:
             reply: text, or in the mode `tools` a sequence of `ToolCall`.
+            stop: why the server ended the reply, such as `length` or `content_filter`; a reply without an action does
+                not count as a mistake of the model then.
 
         Raises:
             ValueError: the episode has ended.
@@ -151,9 +168,26 @@ class Episode:
             raise ValueError("step: got a reply after the end of the episode; expected reset() first")
         parsed = self.language.parse(reply) if isinstance(reply, str) else self.language.parse_calls(reply)
         if parsed.action is None:
-            return self._refuse(parsed)
+            stopped = _STOPS.get(stop)
+            return self._refuse(f"{stopped}." if stopped else parsed.error, stopped is not None)
         self._refused = 0
         return self._play(parsed.action)
+
+    def end(self, ending: str = CONTEXT) -> None:
+        """End the episode without a step.
+
+        Args:
+            ending: one of `CUT_SHORT`.
+
+        Raises:
+            ValueError: it has ended already, or there is no such ending.
+        """
+        if ending not in CUT_SHORT or self._result.ending:
+            raise ValueError(
+                f"end: got {ending!r}, expected one of {', '.join(CUT_SHORT)}, before the end of the episode"
+            )
+        self._questions = []
+        self._result = replace(self._result, ending=ending)
 
     @property
     def question(self) -> Question | None:
@@ -183,19 +217,22 @@ class Episode:
         """Let the environment go."""
         self.env.close()
 
-    def _refuse(self, parsed: Parsed) -> Turn:
+    def _refuse(self, error: str, stopped: bool) -> Turn:
         """Deal with a reply that holds no action."""
         self._refused += 1
+        self._result = replace(
+            self._result, invalid=self._result.invalid + (not stopped), stopped=self._result.stopped + stopped
+        )
         if self._on_invalid == "fail":
-            self._questions = []
-            self._note(0.0, invalid=True, ending=INVALID)
-            return Turn(f"Your reply was not understood: {parsed.error}", 0.0, True, None, parsed.error)
+            self._note()
+            self.end(STOPPED if stopped else INVALID)
+            return Turn(f"Your reply was not understood: {error}", 0.0, True, None, error)
         if self._on_invalid == "retry" and self._refused < _TRIES:
-            self._note(0.0, invalid=True)
-            text = f"Your reply was not understood: {parsed.error} Reply again.\n{self._text}"
-            return Turn(text, 0.0, False, None, parsed.error)
+            self._note()
+            text = f"Your reply was not understood: {error} Reply again.\n{self._text}"
+            return Turn(text, 0.0, False, None, error)
         self._refused = 0
-        return self._play(Action(), parsed.error)
+        return self._play(Action(), error)
 
     def _play(self, action: Action, error: str = "") -> Turn:
         encoded = self.env.encode_action(action)
@@ -204,23 +241,19 @@ class Episode:
         done = bool(terminated or truncated)
         if self._asker is not None:
             self._questions = self._asker.step(encoded, observation["image"], done)
-        ending = outcome_name(info) if done else ""
-        self._note(float(reward), bool(error), ending, bool(info.get("success", False)), played=True)
+        self._note(float(reward), played=True)
+        if done:
+            success = bool(info.get("success", False))
+            self._result = replace(self._result, ending=outcome_name(info), success=success)
         self._text = self.view.observe(observation, info)
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
         return Turn(told + self._text, float(reward), done, action, error)
 
-    def _note(
-        self, reward: float, invalid: bool, ending: str = "", success: bool = False, played: bool = False
-    ) -> None:
+    def _note(self, reward: float = 0.0, played: bool = False) -> None:
+        """Count a reply, and the step that it played."""
         before = self._result
-        self._result = EpisodeResult(
-            success,
-            ending,
-            before.total + reward,
-            before.steps + played,
-            before.replies + 1,
-            before.invalid + invalid,
+        self._result = replace(
+            before, total=before.total + reward, steps=before.steps + played, replies=before.replies + 1
         )
 
 

@@ -7,16 +7,18 @@ from typing import Any, Final, Literal
 
 from inspect_ai import Task, task
 from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.model import ChatMessage, ChatMessageSystem, ChatMessageUser, get_model
+from inspect_ai.model import ChatMessage, ChatMessageAssistant, ChatMessageSystem, ChatMessageUser, get_model
 from inspect_ai.scorer import Score, Scorer, Target, mean, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from socialai_dsl.envs.factory import playable_of
-from socialai_dsl.llm.episode import Episode, OnInvalid
+from socialai_dsl.llm.episode import CONTEXT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.view import Style
 
 _RESULT: Final = "result"
+_STOPS: Final = {"max_tokens": "length", "content_filter": "content_filter"}
+"""Inspect's words for how a server ended a reply, as `Episode.step` takes them."""
 
 
 @task
@@ -84,10 +86,15 @@ def player(episode_maker: Any, history: int | None = WHOLE) -> Solver:
         done = False
         while not done:
             output = await get_model().generate(_shown(state.messages, history))
-            turn = episode.step(output.completion)
-            done = turn.done
             state.output = output
-            state.messages += [output.message, ChatMessageUser(content=turn.text)]
+            message = output.message if output.choices else ChatMessageAssistant(content="")
+            if output.stop_reason == "model_length" and episode.language.parse(message.text).action is None:
+                episode.end(CONTEXT)
+                state.store.set(_RESULT, asdict(episode.result()))
+                break
+            turn = episode.step(message.text, _STOPS.get(output.stop_reason, ""))
+            done = turn.done
+            state.messages += [message, ChatMessageUser(content=turn.text)]
             state.store.set(_RESULT, asdict(episode.result()))  # also if a limit ends the sample
         episode.close()
         return state

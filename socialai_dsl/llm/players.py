@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import count, islice, takewhile
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -17,18 +18,19 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
-from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage
-from socialai_dsl.llm.episode import Episode, EpisodeResult, OnInvalid, Reply, Turn
+from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
+from socialai_dsl.llm.episode import CONTEXT, CUT_SHORT, Episode, EpisodeResult, OnInvalid, Reply, Turn
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
+from socialai_dsl.llm.replies import readable
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
-FORMAT: Final = "socialai-transcript/1"
+FORMAT: Final = "socialai-transcript/2"
 Probing = Literal["apart", "kept", "off"]
 _SETTINGS: Final = "settings.json"
-_KEPT: Final = 4000
-"""The most characters of a reply that are kept and shown to the model again."""
+_SHOWN: Final = 4000
+"""The most characters of a reply that the model is shown again, the last ones without its thoughts."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class PlayedEpisode:
             with what was wrong with it.
         rules: how often each of the scenario's rules fired.
         usage: what its replies took.
+        stops: why the server ended replies before their end, `length` and the like, and how often.
         answered: the answers to probes. asking: whether a question waits for its answer.
     """
 
@@ -95,6 +98,7 @@ class PlayedEpisode:
     replies: list[list[tuple[str, str]]]
     rules: Mapping[str, int]
     usage: Usage
+    stops: Mapping[str, int] = field(default_factory=dict)
     answered: Sequence[AnsweredQuestion] = ()
     asking: bool = False
 
@@ -156,6 +160,8 @@ def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpis
         manner = Manner(**{field.name: settings[field.name] for field in fields(Manner)})
     except (FileNotFoundError, ValueError, KeyError, TypeError):
         raise OtherSettings(f"{folder} holds no transcripts of episodes") from None
+    if settings.get("format") != FORMAT:
+        raise OtherSettings(f"{folder} holds episodes of another version of this program")
     if settings.get("program_sha256") != program.sha256:
         raise OtherSettings(f"{folder} holds episodes of another version of the scenario")
     episode = Episode(program, **manner.of_episodes)
@@ -256,9 +262,15 @@ class LanguageModelPlayer:
         return sorted(played, key=lambda one: one.number)
 
     async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
-        answer = await self._endpoint.ask(
-            client, conversation.messages(), conversation.constraints(), self._answered
-        )
+        """The model's answer; also that the conversation has outgrown its context, which ends the episode."""
+        try:
+            answer = await self._endpoint.ask(
+                client, conversation.messages(), conversation.constraints(), self._answered
+            )
+        except ContextFull:
+            if not (self._answered or conversation.begun):
+                raise  # not even the first observation fits: that is a setting, and no episode
+            return Answer("", stop="context")
         self._answered = True
         self._spent += answer.usage
         return answer
@@ -283,6 +295,7 @@ class Conversation:
         self._number = number
         self._path = path
         self._usage = Usage()
+        self._stops: Counter[str] = Counter()
         self._before = episode.env.counters()["rules"]
         self._text = episode.reset(test_episode=number)
         self._exchanges: list[list[Mapping[str, Any]]] = []
@@ -296,6 +309,11 @@ class Conversation:
     def done(self) -> bool:
         """Whether nothing is left to be played or asked."""
         return bool(self._episode.result().ending) and self._episode.question is None
+
+    @property
+    def begun(self) -> bool:
+        """Whether a reply was played."""
+        return bool(self._exchanges)
 
     def messages(self) -> list[Mapping[str, Any]]:
         """The instructions, the exchanges so far, and what is seen now, perhaps with the question of a probe."""
@@ -325,13 +343,16 @@ class Conversation:
     def add(self, answer: Answer) -> None:
         """Write an answer down, then play it, or note it as that to a probe."""
         question = self._episode.question
-        record: dict[str, Any] = {"observation": self._text, "reply": answer.text[-_KEPT:]}
+        record: dict[str, Any] = {"observation": self._text, "reply": answer.text}
         if question is not None:
             record |= {"probe": question.probe, "question": self._put(question), "right": question.right}
         elif self._manner.mode == "tools":
-            record["calls"] = [[call.name[:_KEPT], call.arguments[:_KEPT]] for call in answer.calls]
+            record["calls"] = [[call.name, call.arguments] for call in answer.calls]
+        notes = {"reasoning": answer.reasoning, "stop": answer.stop, "finish_reason": answer.reason}
+        record |= {key: note for key, note in notes.items() if note}
         usage = answer.usage
         record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
+        record |= {"reasoning_tokens": usage.reasoning} if usage.reasoning else {}
         record |= {"estimated": True} if usage.estimated else {}
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with open(self._path, "a", encoding="utf-8") as file:
@@ -349,6 +370,7 @@ class Conversation:
             [replies for replies in self._replies if replies],
             rules,
             self._usage,
+            dict(self._stops),
             tuple(self._episode.answered),
             self._episode.question is not None,
         )
@@ -360,22 +382,29 @@ class Conversation:
             record["completion_tokens"],
             record["cost"],
             record.get("estimated", False),
+            record.get("reasoning_tokens", 0),
         )
+        stop = record.get("stop", "")
+        self._stops.update([stop] if stop else [])
         if "probe" in record and self._episode.question is None:
             return  # nobody asks now: the episode is played again from its transcript
         if self._episode.question is not None:
             if self._manner.probes == "kept":
                 put = {"role": "user", "content": self._put(self._episode.question)}
                 self._exchanges.append(
-                    [put, {"role": "assistant", "content": record["reply"] or "(nothing)"}]
+                    [put, {"role": "assistant", "content": _shown(record["reply"]) or "(nothing)"}]
                 )
             self._episode.answer(record["reply"])
+            return
+        if stop == "context":
+            self._episode.end(CONTEXT)
+            self._replies[-1].append(("", CUT_SHORT[CONTEXT]))
             return
         calls = [ToolCall(*call) for call in record.get("calls", ())]
         # Who answers in words where tools are asked for may name the action there.
         reply: Reply = calls or record["reply"]
-        turn = self._episode.step(reply)
-        self._exchanges.append(_exchange(self._text, record["reply"], calls, turn))
+        turn = self._episode.step(reply, stop)
+        self._exchanges.append(_exchange(self._text, _shown(record["reply"]), calls, turn))
         self._text = turn.text
         written = "\n".join([record["reply"], *(f"{call.name}({call.arguments})" for call in calls)])
         self._replies[-1].append((written.strip(), turn.error))
@@ -386,13 +415,22 @@ class Conversation:
         return put(question, self._manner.mode)
 
 
+def _shown(reply: str) -> str:
+    """What a model is shown of its own reply."""
+    return readable(reply, "Act").strip()[-_SHOWN:]
+
+
 def _exchange(text: str, reply: str, calls: list[ToolCall], turn: Turn) -> list[Mapping[str, Any]]:
     """An observation and its reply as messages; a tool that was called has to be answered."""
     asked = {"role": "user", "content": text}
     if not calls:
         return [asked, {"role": "assistant", "content": reply or "(nothing)"}]
     named = [
-        {"id": f"call{n}", "type": "function", "function": {"name": call.name, "arguments": call.arguments}}
+        {
+            "id": f"call{n}",
+            "type": "function",
+            "function": {"name": call.name[:_SHOWN], "arguments": call.arguments[:_SHOWN]},
+        }
         for n, call in enumerate(calls)
     ]
     told = "not understood" if turn.error else "done"

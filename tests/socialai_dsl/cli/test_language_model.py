@@ -55,6 +55,11 @@ def figures(out: Path, scenario: str = "talkitout") -> Any:
     return json.loads((out / scenario_folder_name(scenario) / "result.json").read_text(encoding="utf-8"))
 
 
+def transcript(out: Path, number: int = 0, scenario: str = "talkitout") -> list[dict[str, Any]]:
+    path = out / scenario_folder_name(scenario) / f"transcripts/episode-{number:03d}.jsonl"
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
 def script(scenario: str) -> Any:
     """A model that plays the scenario's script: it recognises the episode by its first observation."""
     playing: dict[str, Episode] = {}
@@ -97,7 +102,14 @@ def test_a_model_that_knows_the_script_does_what_the_script_does(tmp_path: Path,
     assert f"{10 * replies:,} read and {2 * replies:,} written" in printed
 
 
-def test_a_request_holds_the_instructions_and_the_last_observations(tmp_path: Path) -> None:
+def test_a_request_holds_the_whole_episode_or_says_what_it_leaves_out(tmp_path: Path) -> None:
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path / "whole", episodes=1) == 0
+    whole = [message["content"] for message in stub.requests[-1]["messages"]]
+    assert len(whole) == 2 * 100
+    assert not [text for text in whole if "left out" in text]
+    assert figures(tmp_path / "whole")["eval"]["actions"] == "prose and text, the whole episode"
+
     with endpoint(lambda _: "Act: left") as stub:
         options = ["--history", "3", "--temperature", "0.5", "--max-tokens", "50", "--goal", "Leave."]
         assert evaluate(stub.url, tmp_path, *options, "--concurrency", "1", episodes=1) == 0
@@ -106,11 +118,14 @@ def test_a_request_holds_the_instructions_and_the_last_observations(tmp_path: Pa
     assert [message["role"] for message in last["messages"]] == ["system", *["user", "assistant"] * 2, "user"]
     assert last["messages"][0]["content"].endswith("Leave.")
     assert last["messages"][2]["content"] == "Act: left"
+    lines = sum(text.count("\n") + 1 for text in whole[1:-6:2])
+    told = f"(97 earlier turns are left out here, {lines} lines of what you saw and heard.)\n\n"
+    assert [message["content"] for message in last["messages"][1:]] == [told + whole[-5], *whole[-4:]]
     assert (last["model"], last["temperature"], last["max_tokens"]) == ("stub", 0.5, 50)
     assert "temperature" in stub.requests[0]
-    lines = (tmp_path / "talkitout/transcripts/episode-000.jsonl").read_text().splitlines()
-    assert len(lines) == 100
-    assert json.loads(lines[0])["reply"] == "Act: left"
+    records = transcript(tmp_path)
+    assert len(records) == 100
+    assert records[0]["reply"] == "Act: left"
 
 
 def test_json_and_tools(tmp_path: Path) -> None:
@@ -146,6 +161,10 @@ FAULTS: dict[str, Any] = {
     "cut, but closed well": (200, {}, completion("Act: left")[:90]),
     "not JSON": (200, {}, b"<html>busy</html>"),
     "no choices": (200, {}, b'{"choices": []}'),
+    "binary": (200, {}, bytes(range(256))),
+    "deep": (200, {}, b"[" * 100_000),
+    "odd date": (503, {"Retry-After": "Mon, 01 Jan 0001 00:00:00"}, b""),
+    "no time": (429, {"Retry-After": "nan"}, b""),
     "empty body": (200, {}, b""),
     "a list": (200, {}, b"[1]"),
     "hung up": None,
@@ -205,6 +224,122 @@ def test_answers_without_an_action_count_as_invalid(tmp_path: Path) -> None:
     result = figures(tmp_path)["eval"]
     assert (result["replies"], result["invalid_replies"]) == (4, 3)
     assert max(len(json.dumps(request)) for request in stub.requests) < 20_000
+
+
+ODD: dict[str, Any] = {
+    "no choices": b'{"choices": []}',
+    "null": b'{"choices": null}',
+    "wrong types": b'{"choices": [{"message": {"content": 7}}]}',
+    "no message": b'{"choices": [{"message": null, "finish_reason": {}}], "usage": [1]}',
+    "too long": b'{"choices": [{"message": {"content": "' + b"x" * 4_000_000 + b'"}}]}',
+}
+
+
+@pytest.mark.parametrize("odd", one_in(2, ODD, "plays a command"))
+def test_a_completion_without_a_message_counts_apart(odd: str, tmp_path: Path, capsys: Capture) -> None:
+    """Also the first answer of a server, and one that no further try improves."""
+    with endpoint(
+        lambda request: (200, {}, ODD[odd]) if len(request["messages"]) == 2 else "Act: done"
+    ) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    found = figures(tmp_path)["eval"]
+    assert (found["replies"], found["invalid_replies"], found["stopped_replies"]) == (2, 0, 1)
+    (stop,) = found["stops"]
+    assert stop == transcript(tmp_path)[0]["stop"] == ("length" if odd == "too long" else "unreadable")
+    assert f"{stop} 1; 1 of them without an action, apart from the invalid ones" in capsys.readouterr().out
+
+
+def test_replies_that_the_server_ends_count_apart(tmp_path: Path, capsys: Capture) -> None:
+    filtered = b'{"error": {"code": "content_filter", "message": "The response was filtered."}}'
+    replies = iter(
+        [
+            (200, {}, completion({"content": "I see a", "reasoning_content": "Hm. Act: left"}, "length")),
+            (200, {}, completion("Act: left", "length")),
+            (200, {}, completion("", "content_filter")),
+            (400, {}, filtered),
+            {"content": None, "refusal": "No."},
+        ]
+    )
+    with endpoint(lambda _: next(replies, "Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    found = figures(tmp_path)["eval"]
+    assert (found["replies"], found["invalid_replies"], found["stopped_replies"]) == (6, 1, 3)
+    assert found["stops"] == {"content_filter": 2, "length": 2, "refusal": 1}
+    assert "content_filter 2, length 2, refusal 1; 3 of them without an action" in capsys.readouterr().out
+    first, second, *_ = transcript(tmp_path)
+    assert (first["reasoning"], first["stop"], first["finish_reason"]) == (
+        "Hm. Act: left",
+        "length",
+        "length",
+    )
+    assert "the server cut your reply off" in second["observation"]
+    assert "Hm." not in json.dumps(stub.requests[-1])
+
+
+FULL = {
+    "OpenAI": (400, {}, b'{"error": {"message": "Too much.", "code": "context_length_exceeded"}}'),
+    "vLLM": (
+        400,
+        {},
+        b'{"object": "error", "message": "This model\'s maximum context length is 4096 tokens."}',
+    ),
+    "llama.cpp": (400, {}, b'{"error": {"message": "No.", "type": "exceed_context_size_error"}}'),
+    "Anthropic": (400, {}, b'{"error": {"message": "prompt is too long: 208310 tokens > 200000 maximum"}}'),
+    "TGI": (422, {}, b'{"error": "Input validation error: `inputs` must have less than 4096 tokens."}'),
+    "Gemini": (400, {}, b'[{"error": {"message": "The input token count (9) exceeds the maximum number"}}]'),
+    "without JSON": (413, {}, b"the request exceeds the available context size"),
+}
+
+
+@pytest.mark.parametrize("server", one_in(3, FULL, "plays a command"))
+def test_a_full_context_ends_its_episode_and_no_other(server: str, tmp_path: Path, capsys: Capture) -> None:
+    def respond(request: dict[str, Any]) -> Any:
+        long = len(request["messages"]) > 8 and len(stub.requests) < 20
+        return FULL[server] if long else "Act: left" if len(stub.requests) < 20 else "Act: done"
+
+    with endpoint(respond) as stub:
+        assert evaluate(stub.url, tmp_path, "--concurrency", "1", "--record", "2") == 0
+        asked = len(stub.requests)
+        found = figures(tmp_path)["eval"]
+        full = round(3 * found["outcomes"]["context full"])
+        assert full >= 1
+        assert (found["episodes"], found["invalid_replies"], found["stopped_replies"]) == (3, 0, 0)
+        assert found["stops"] == {"context": full}
+        assert transcript(tmp_path)[-1]["stop"] == "context"
+        assert "a conversation longer than the model's context" in capsys.readouterr().out
+        assert evaluate(stub.url, tmp_path, "--concurrency", "1") == 0
+    assert len(stub.requests) == asked, "nothing is asked again"
+    (ended,) = {
+        trace["moments"][-1]["ended"]["name"]
+        for trace in episodes_in(tmp_path / "talkitout/episode.html")[:1]
+    }
+    assert ended in ("context full", "gave_up")
+
+
+def test_a_context_that_not_even_a_beginning_fits_in_is_told_of(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: FULL["OpenAI"]) as stub:
+        assert evaluate(stub.url, tmp_path) == 2
+    assert "status 400: Too much." in capsys.readouterr().err
+
+
+def test_a_rate_limit_is_no_full_context(tmp_path: Path) -> None:
+    limit = (
+        b'{"error": {"message": "Request too large: 9000 tokens per minute", "code": "rate_limit_exceeded"}}'
+    )
+    replies = iter(["Act: left", (429, {}, limit)])
+    with endpoint(lambda _: next(replies, "Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    assert figures(tmp_path)["eval"]["stops"] == {}
+
+
+def test_thoughts_are_taken_away_before_anything_else(tmp_path: Path) -> None:
+    thoughts = "<think>" + "What if I say Act: forward? " * 400 + "</think>"
+    with endpoint(lambda request: thoughts + ("" if len(request["messages"]) == 2 else "Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    found = figures(tmp_path)["eval"]
+    assert (found["replies"], found["invalid_replies"]) == (2, 1)
+    assert transcript(tmp_path)[0]["reply"] == thoughts
+    assert "What if" not in json.dumps(stub.requests[1])
 
 
 def test_a_reply_without_an_action_may_end_the_episode(tmp_path: Path, capsys: Capture) -> None:
@@ -347,7 +482,7 @@ def episodes_in(page: Path) -> list[dict[str, Any]]:
 
 
 def test_a_replay_shows_what_the_model_answered(tmp_path: Path, capsys: Capture) -> None:
-    replies = iter(["I wonder.", "x" * 9000 + " Act: left", "Act: done"])
+    replies = iter(["I wonder.", "x" * 9000 + "\nAct: left", "Act: done"])
     with endpoint(lambda _: next(replies)) as stub:
         assert evaluate(stub.url, tmp_path, "--record", "1", "--on-invalid", "retry", episodes=1) == 0
     page = tmp_path / "talkitout" / "episode.html"

@@ -28,11 +28,11 @@ class Stub:
         self.keys: list[str] = []
 
 
-def completion(message: Any) -> bytes:
+def completion(message: Any, finish_reason: str = "stop") -> bytes:
     """The content of an answer; it takes ten tokens and two."""
     message = {"role": "assistant", "content": message} if isinstance(message, str) else message
     usage = {"prompt_tokens": 10, "completion_tokens": 2, "total_tokens": 12}
-    choice = {"index": 0, "message": message, "finish_reason": "stop"}
+    choice = {"index": 0, "message": message, "finish_reason": finish_reason}
     found = {"id": "1", "object": "chat.completion", "created": 0, "model": "stub", "choices": [choice]}
     return json.dumps({**found, "usage": usage}).encode()
 
