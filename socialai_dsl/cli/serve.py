@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from typing import Final
 
-from socialai_dsl.cli.arguments import STYLE, natural, positive
+from socialai_dsl.cli.arguments import STYLE, natural, positive, seconds
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -28,6 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
     parser.add_argument(
+        "--allow",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="further name or address under which clients may ask (repeatable); they always may under that of --host, "
+        "localhost and 127.0.0.1, and all others are refused",
+    )
+    parser.add_argument(
         "--port", type=natural, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
     parser.add_argument("--style", **STYLE)
@@ -37,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=100,
         metavar="N",
         help="largest number of sessions at once (default: 100)",
+    )
+    parser.add_argument(
+        "--idle",
+        type=seconds,
+        metavar="SECONDS",
+        help="end a session that sends nothing for so long (default: 900)",
     )
 
 
@@ -49,15 +63,20 @@ def execute(arguments: argparse.Namespace) -> Exit:
     program = socialai_dsl.compile(socialai_dsl.load(arguments.scenario))
     import uvicorn
 
+    from socialai_dsl.llm.gate import IDLE, MOST_BYTES
     from socialai_dsl.llm.openenv import application
 
-    app = application(program, arguments.style, arguments.sessions)
+    hosts = [arguments.host, *arguments.allow]
+    app = application(program, arguments.style, arguments.sessions, hosts, arguments.idle or IDLE)
+    family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
     try:
-        listening = socket.create_server((arguments.host, arguments.port))
+        listening = socket.create_server((arguments.host, arguments.port), family=family)
     except (OSError, OverflowError) as error:
         raise UsageError(f"cannot serve on {arguments.host}:{arguments.port}: {error}") from None
     with listening:
         address, port = listening.getsockname()[:2]
-        print(f"{program.name} at http://{address}:{port}, Ctrl-C stops it", file=sys.stderr, flush=True)
-        uvicorn.Server(uvicorn.Config(app, log_level="warning")).run(sockets=[listening])
+        shown = f"[{address}]" if ":" in address else address
+        print(f"{program.name} at http://{shown}:{port}, Ctrl-C stops it", file=sys.stderr, flush=True)
+        config = uvicorn.Config(app, log_level="warning", ws_max_size=MOST_BYTES)
+        uvicorn.Server(config).run(sockets=[listening])
     return Exit.GOOD

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from secrets import randbelow
 from typing import Any, ClassVar
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
 from openenv.core.client_types import StepResult
 from openenv.core.env_client import EnvClient
 from openenv.core.env_server import Environment, create_fastapi_app
-from openenv.core.env_server.types import Action, EnvironmentMetadata, Observation, State
+from openenv.core.env_server.types import (
+    Action,
+    ConcurrencyConfig,
+    EnvironmentMetadata,
+    Observation,
+    State,
+)
 from pydantic import Field, model_validator
 
 from socialai_dsl.llm.episode import Episode
+from socialai_dsl.llm.gate import IDLE, Gate
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
@@ -29,8 +39,12 @@ class Reply(Action):
     @classmethod
     def _as_text(cls, given: Any) -> Any:
         """Take JSON of any other form for the reply itself: trainers send a reply that is JSON as what it says."""
-        reply = given.get("message", given) if isinstance(given, dict) else given
-        return given if isinstance(reply, str) else {"message": json.dumps(reply, ensure_ascii=False)}
+        named = isinstance(given, dict) and "message" in given and given.keys() <= {"message", "metadata"}
+        reply = given["message"] if named else given
+        try:
+            return {"message": reply if isinstance(reply, str) else json.dumps(reply, ensure_ascii=False)}
+        except RecursionError:
+            return {"message": ""}  # nested deeper than can be written, so it says nothing
 
 
 class Told(Observation):
@@ -70,6 +84,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         self._id: str | None = None
         self._seed: int | None = None
         self._test_episode: int | None = None
+        self._begun = False
 
     def reset(
         self,
@@ -91,11 +106,16 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         if test_episode is None and seed is None:
             seed = randbelow(_SEEDS)
         text = self._episode.reset(seed, test_episode)
+        self._begun = True
         self._id, self._seed, self._test_episode = episode_id, seed, test_episode
         return Told(text=text, instructions=self._episode.instructions, done=False, reward=0.0)
 
     def step(self, action: Reply, timeout_s: float | None = None, **_: Any) -> Told:
         """Play a reply. Raises ValueError outside of an episode."""
+        if not self._begun:
+            raise ValueError(
+                "step: this session has no episode; expected a reset first, over the same websocket"
+            )
         turn = self._episode.step(action.message)
         result = self._episode.result()
         ended = {"success": result.success, "ending": result.ending} if turn.done else {}
@@ -119,6 +139,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
 
     def close(self) -> None:
         """Let the environment go."""
+        self._begun = False
         self._episode.close()
 
 
@@ -136,14 +157,33 @@ class ScenarioClient(EnvClient[Reply, Told, Progress]):
         return Progress(**payload)
 
 
-def application(program: Playable, style: Style = "prose", sessions: int = 100) -> FastAPI:
+def application(
+    program: Playable,
+    style: Style = "prose",
+    sessions: int = 100,
+    hosts: Iterable[str] = (),
+    idle: float = IDLE,
+) -> FastAPI:
     """The server of a scenario or suite.
 
     Args:
         program: its program.
         style: how observations are written, see `TextView`.
         sessions: how many may play at once.
+        hosts: names under which it may be asked, beside those of the loopback interface.
+        idle: seconds after which a session ends that sends nothing.
     """
-    return create_fastapi_app(
-        lambda: ScenarioEnvironment(program, style), Reply, Told, max_concurrent_envs=sessions
+    limits = ConcurrencyConfig(max_concurrent_envs=sessions, session_timeout=idle)
+    app = create_fastapi_app(
+        lambda: ScenarioEnvironment(program, style), Reply, Told, concurrency_config=limits
     )
+    app.add_middleware(Gate, hosts=tuple(hosts), idle=idle)
+    app.add_exception_handler(ValueError, _refuse)
+    app.add_exception_handler(RequestValidationError, _refuse)
+    return app
+
+
+def _refuse(_: Request, error: Exception) -> JSONResponse:
+    """Answer what cannot be done with a sentence; what was given is not repeated, since JSON may not hold it."""
+    said = "the request is not of the form that /schema shows" if hasattr(error, "errors") else str(error)
+    return JSONResponse({"detail": said}, 422)

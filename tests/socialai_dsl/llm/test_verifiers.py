@@ -1,4 +1,4 @@
-"""verifiers' `openenv` taskset lets a model play what `socialai serve openenv` serves."""
+"""verifiers' `openenv` taskset lets a model play what `socialai serve` serves."""
 
 import json
 import os
@@ -43,7 +43,7 @@ api_key_var = "MODEL_KEY"
 @pytest.fixture
 def url() -> Iterator[str]:
     """A server of `help`."""
-    command = [sys.executable, "-m", "socialai_dsl", "serve", "openenv", "--scenario", "help", "--port", "0"]
+    command = [sys.executable, "-m", "socialai_dsl", "serve", "help", "--port", "0"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
         assert server.stderr is not None
         found = re.search(r"http://\S+?(?=,)", server.stderr.readline())
