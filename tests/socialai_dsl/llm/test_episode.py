@@ -9,7 +9,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.actions import Action
-from socialai_dsl.llm.episode import INVALID, scripted_reply
+from socialai_dsl.llm.episode import CONTEXT, INVALID, STOPPED, scripted_reply
 from socialai_dsl.llm.view import Style
 from tests.quick import one_in
 
@@ -55,6 +55,23 @@ def play_beside(name: str, rooms: range) -> int:
 @pytest.mark.parametrize("name", one_in(5, SCRIPTED, "plays every scenario in text and beside it"))
 def test_a_script_loses_nothing_in_text(name: str) -> None:
     assert play_beside(name, range(ROOMS)) > ROOMS
+
+
+@pytest.mark.parametrize("name", one_in(5, SCRIPTED, "plays every scenario in text"))
+def test_by_default_a_request_holds_all_that_was_seen_and_heard(name: str, tmp_path: Path) -> None:
+    """So no line that decides is lost, however early it was."""
+    players = pytest.importorskip("socialai_dsl.llm.players", reason="language models need the extra llm")
+    answer = pytest.importorskip("socialai_dsl.llm.endpoint").Answer
+    episode, beside = Episode(name), Episode(name)
+    told = [beside.reset(test_episode=0)]
+    playing = players.Conversation(episode, players.Manner(), 0, tmp_path / "transcript.jsonl")
+    while not playing.done:
+        messages = playing.messages()
+        assert [message["content"] for message in messages[1::2]] == told
+        reply = scripted_reply(beside)
+        told.append(beside.step(reply).text)
+        playing.add(answer(reply))
+    assert len(told) > 1
 
 
 @pytest.mark.slow
@@ -109,6 +126,29 @@ def test_asking_again_takes_no_step_until_the_third_reply() -> None:
     assert episode.result().steps == 0
     assert episode.step("hm").action == Action()
     assert (episode.result().steps, episode.result().invalid) == (1, 3)
+
+
+def test_what_the_server_ends_is_no_mistake_of_the_model(episode: Episode) -> None:
+    assert episode.step("Act: left", stop="length").action == Action("left")
+    turn = episode.step("I think that I should", stop="length")
+    assert turn.action == Action()
+    assert turn.text.startswith(
+        "Your reply was not understood, and you did nothing: the server cut your reply off"
+    )
+    episode.step("", stop="refusal")  # its own decision
+    result = episode.result()
+    assert (result.replies, result.invalid, result.stopped) == (3, 1, 1)
+    episode.end(CONTEXT)
+    assert (episode.result().ending, episode.result().success) == (CONTEXT, False)
+    with pytest.raises(ValueError, match="before the end of the episode"):
+        episode.end(CONTEXT)
+
+
+def test_a_reply_that_was_cut_off_may_end_the_episode() -> None:
+    episode = Episode("talkitout", on_invalid="fail")
+    episode.reset(seed=0)
+    assert episode.step("", stop="content_filter").done
+    assert (episode.result().ending, episode.result().invalid) == (STOPPED, 0)
 
 
 def test_an_invalid_reply_may_end_the_episode() -> None:

@@ -28,7 +28,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def run(respond: Any, **arguments: Any) -> Any:
     def output(messages: list[Any], *_: Any) -> ModelOutput:
-        found = ModelOutput.from_content("mockllm/model", respond(messages))
+        said = respond(messages)
+        content, stop_reason = said if isinstance(said, tuple) else (said, "stop")
+        found = ModelOutput.from_content("mockllm/model", content, stop_reason)
         # Without it, the mock would look for a tokenizer on the network.
         found.usage = ModelUsage(input_tokens=10, output_tokens=2, total_tokens=12)
         return found
@@ -52,7 +54,7 @@ def test_the_task_of_the_entry_point_scores_what_the_script_reaches() -> None:
         episode.step(reply)
         return reply
 
-    log = run(script, scenario="talkitout", episodes=6, history=1000)
+    log = run(script, scenario="talkitout", episodes=6)
     assert log.status == "success", log.error
     values = {score.name: {m: v.value for m, v in score.metrics.items()} for score in log.results.scores}
     results = [episode.result() for episode in playing.values()]
@@ -66,17 +68,36 @@ def test_the_task_of_the_entry_point_scores_what_the_script_reaches() -> None:
 
 
 def test_invalid_replies_and_a_short_history() -> None:
-    lengths = []
+    lengths, first = [], []
 
     def respond(messages: list[Any]) -> str:
         lengths.append(len(messages))
+        first.append(messages[1].text)
         return "hm" if len(lengths) % 2 else "Act: left"
 
     log = run(respond, scenario="talkitout", episodes=1, history=3)
     (sample,) = log.samples
     assert sample.scores["outcome"].value == {"success": 0, "return": 0.0, "steps": 100, "invalid_rate": 0.5}
     assert max(lengths) == 6
+    assert "left out" not in first[2]
+    assert first[3].startswith("(1 earlier turn is left out here, ")
+    assert first[-1].startswith("(97 earlier turns are left out here, ")
     assert "Your reply was not understood" in sample.messages[3].text
+
+
+def test_what_the_server_ends_counts_apart() -> None:
+    replies = iter([("I see", "max_tokens"), ("", "content_filter"), "hm", ("Act: left", "max_tokens")])
+    log = run(
+        lambda _: next(replies, ("The prompt is too long.", "model_length")), scenario="talkitout", episodes=1
+    )
+    (sample,) = log.samples
+    found = sample.scores["outcome"].metadata
+    assert (found["ending"], found["steps"], found["invalid"], found["stopped"]) == ("context full", 4, 1, 2)
+
+
+def test_a_history_is_a_number_of_observations() -> None:
+    with pytest.raises(Exception, match="history: got 0"):
+        run(lambda _: "Act: left", scenario="talkitout", history=0)
 
 
 def test_a_scenario_that_is_not_there_is_told_of() -> None:
