@@ -309,11 +309,10 @@ def test_a_full_context_ends_its_episode_and_no_other(server: str, tmp_path: Pat
         assert "a conversation longer than the model's context" in capsys.readouterr().out
         assert evaluate(stub.url, tmp_path, "--concurrency", "1") == 0
     assert len(stub.requests) == asked, "nothing is asked again"
-    (ended,) = {
-        trace["moments"][-1]["ended"]["name"]
-        for trace in episodes_in(tmp_path / "talkitout/episode.html")[:1]
-    }
-    assert ended in ("context full", "gave_up")
+    ended = [
+        trace["moments"][-1]["ended"]["name"] for trace in episodes_in(tmp_path / "talkitout/episode.html")
+    ]
+    assert "context full" in ended
 
 
 def test_a_context_that_not_even_a_beginning_fits_in_is_told_of(tmp_path: Path, capsys: Capture) -> None:

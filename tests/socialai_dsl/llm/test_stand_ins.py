@@ -1,0 +1,133 @@
+"""What is written for OpenEnv and Inspect AI is executed in each run, with stand-ins where a library is missing."""
+
+import asyncio
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+import pytest
+from starlette.websockets import WebSocketDisconnect
+
+import socialai_dsl.llm as llm
+from socialai_dsl.envs.factory import playable_of
+from socialai_dsl.llm import Episode
+from tests.socialai_dsl.llm.stand_ins import OPENENV, Model, TaskState, inspect_ai
+
+with warnings.catch_warnings():  # some releases ask for another client
+    warnings.simplefilter("ignore")
+    from starlette.testclient import TestClient
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries
+NAME = "testserver"  # how the client calls a server
+
+
+@contextmanager
+def imported(name: str, stand_ins: dict[str, ModuleType]) -> Iterator[Any]:
+    """One of our modules, with stand-ins of what it imports; afterwards all is as it was."""
+    before = dict(sys.modules)
+    sys.modules.update(stand_ins)
+    try:
+        yield import_module(f"socialai_dsl.llm.{name}")
+    finally:
+        sys.modules.clear()
+        sys.modules.update(before)
+        vars(llm).pop(name, None)
+
+
+@pytest.fixture
+def openenv() -> Iterator[Any]:
+    with imported("openenv", {} if find_spec("openenv") else OPENENV) as module:
+        yield module
+
+
+@pytest.fixture
+def client(openenv: Any) -> TestClient:
+    return TestClient(openenv.application(playable_of("talkitout"), hosts=[NAME], idle=0.5))
+
+
+def test_a_session_plays_an_episode(client: TestClient) -> None:
+    beside = Episode("talkitout")
+    with client.websocket_connect("/ws") as session:
+
+        def say(kind: str, **data: Any) -> Any:
+            session.send_json({"type": kind, **({"data": data} if kind != "state" else {})})
+            return session.receive_json()["data"]
+
+        assert "expected a reset first" in say("step", message="Act: left")["message"]
+        assert "seed: got -1" in say("reset", seed=-1)["message"]
+        told = say("reset", seed=7)["observation"]
+        assert (told["text"], told["instructions"]) == (beside.reset(seed=7), beside.instructions)
+        for reply in ("Act: left", '{"move": "left"}', "hm", "Act: done"):
+            turn, told = beside.step(reply), say("step", message=reply)
+            assert (told["observation"]["text"], told["done"]) == (turn.text, turn.done)
+        assert (told["observation"]["success"], told["observation"]["ending"]) == (
+            False,
+            beside.result().ending,
+        )
+        state = say("state")
+        assert (state["seed"], state["step_count"], state["invalid_replies"]) == (7, 4, 1)
+        with pytest.raises(WebSocketDisconnect) as ended:
+            session.receive_json()
+        assert (ended.value.code, ended.value.reason) == (1001, "the session was silent for 0.5 s")
+
+
+def test_a_request_that_cannot_be_done_is_answered_with_a_sentence(client: TestClient) -> None:
+    assert client.post("/reset", json={"seed": 7}).status_code == 200
+    for path, body in (("/reset", {"seed": 10**30}), ("/step", {"action": {"message": "Act: left"}})):
+        answer = client.post(path, json=body)
+        assert (answer.status_code, type(answer.json()["detail"])) == (422, str)
+    assert client.post("/reset", headers={"Host": "evil.example"}).status_code == 403
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/ws", headers={"Origin": "null"}):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ({"message": "Act: left", "metadata": {}}, "Act: left"),
+        ({"message": {"move": "left"}}, '{"move": "left"}'),
+        ({"move": "left"}, '{"move": "left"}'),
+        ({"message": "Act: left", "more": 1}, '{"message": "Act: left", "more": 1}'),
+    ],
+)
+def test_json_of_any_form_is_a_reply(openenv: Any, action: Any, message: str) -> None:
+    assert openenv.Reply.model_validate(action).message == message
+
+
+@pytest.mark.skipif(
+    find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
+)
+def test_a_sample_is_played_to_its_end() -> None:
+    model = Model([("hm", "stop"), ("I see", "max_tokens"), ("", "unknown"), ("Act: left", "stop")])
+    with imported("inspect_task", inspect_ai(model)) as module:
+        task = module.scenario(episodes=2)
+        states = [TaskState(sample.metadata) for sample in task.dataset]
+        for state in states:
+            asyncio.run(task.solver(state, None))
+        values = [asyncio.run(task.scorer(state, None)) for state in states]
+    assert {value.answer for value in values} <= set(playable_of("talkitout").outcomes)
+    found = values[0].metadata
+    assert (found["replies"], found["invalid"], found["stopped"], found["steps"]) == (5, 2, 1, 5)
+    assert model.asked[0][1].text == Episode("talkitout").reset(test_episode=0)
+    assert [len(messages) for messages in model.asked] == [2, 4, 6, 8, 10, 2], "the whole episode"
+
+
+@pytest.mark.skipif(
+    find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
+)
+def test_a_limit_is_told_and_a_full_context_ends_a_sample() -> None:
+    model = Model([("Act: left", "stop")] * 3 + [("The prompt is too long.", "model_length")])
+    with imported("inspect_task", inspect_ai(model)) as module:
+        with pytest.raises(ValueError, match="history: got 0"):
+            module.scenario(episodes=1, history=0)
+        task = module.scenario(episodes=1, history=2)
+        state = TaskState(task.dataset[0].metadata)
+        asyncio.run(task.solver(state, None))
+        assert asyncio.run(task.scorer(state, None)).answer == "context full"
+    assert [len(messages) for messages in model.asked] == [2, 4, 4, 4]
+    assert model.asked[-1][1].text.startswith("(2 earlier turns are left out here, ")
