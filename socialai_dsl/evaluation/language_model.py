@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
@@ -134,9 +135,18 @@ def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:
 def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
     from socialai_dsl.llm.endpoint import OPENAI, Endpoint
 
+    for name, given in (("the model", agent), ("--base-url", options.base_url), ("--goal", options.goal)):
+        if not _is_unicode(given or ""):
+            raise UsageError(f"{name}: got {given!r}, expected a text in Unicode")
+    if options.temperature is not None and not isfinite(options.temperature):
+        raise UsageError(f"--temperature: got {options.temperature}, expected a number such as 0.7")
     url = options.base_url or OPENAI
-    parts = urlsplit(url)
-    if parts.scheme not in ("http", "https") or not parts.hostname:
+    try:
+        parts = urlsplit(url)
+        known = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        known = False
+    if not known:
         raise UsageError(f"--base-url: got {url!r}, expected one such as http://localhost:8080/v1")
     if parts.username is not None or parts.password is not None:
         raise UsageError("--base-url: expected one without a name and a password, which logs would show")
@@ -155,6 +165,15 @@ def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
     return Endpoint(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
+
+
+def _is_unicode(text: str) -> bool:
+    """Whether a text is one that can be sent: bytes of a command line that are none become halves of characters."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _prices(text: str | None) -> tuple[float, float] | None:

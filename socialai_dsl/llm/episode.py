@@ -40,6 +40,8 @@ _STOPS: Final = {
 }
 """What a model is told of replies that the server ended. Its own refusals are its own mistakes."""
 
+TEST_SET: Final = 500
+"""The episodes of the test set."""
 _TRIES: Final = 3
 
 

@@ -12,11 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.draws import MAX_SEED
+from socialai_dsl.llm.episode import TEST_SET
 
 IDLE: Final = 900.0
 """Seconds that a session may be silent, unless the server is told otherwise."""
-TEST_SET: Final = 500
-"""The episodes of the test set."""
 MOST_BYTES: Final = 1_000_000
 """The longest message."""
 _LOOPBACK: Final = ("localhost", "127.0.0.1", "::1")

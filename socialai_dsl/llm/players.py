@@ -130,7 +130,8 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
         except ValueError:
-            found = {}
+            found = None
+        found = found if isinstance(found, dict) else {}
         other = sorted(key for key in {*content, *found} if content.get(key) != found.get(key))
         if other:
             raise OtherSettings(f"{folder} holds episodes that were played with another {', '.join(other)}")

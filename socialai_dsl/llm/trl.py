@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final, Literal
 
 from socialai_dsl.envs.factory import Scenario, playable_of
 from socialai_dsl.llm.actions import ActionLanguage, ToolCall
-from socialai_dsl.llm.episode import Episode
+from socialai_dsl.llm.episode import TEST_SET, Episode
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
@@ -40,6 +40,10 @@ class SocialEnv:
         Raises:
             ValueError: a number is out of range.
         """
+        if test_episode is not None and not 0 <= test_episode < TEST_SET:
+            raise ValueError(
+                f"test_episode: got {test_episode!r}, expected a number from 0 to {TEST_SET - 1}"
+            )
         self._done = False
         return f"{self._episode.instructions}\n\n{self._episode.reset(seed, test_episode)}"
 

@@ -94,6 +94,8 @@ def test_trl_finds_the_tools_and_no_others() -> None:
 
 def test_before_an_episode_tools_say_so() -> None:
     env: Any = social_env("help")()
+    with pytest.raises(ValueError, match="test_episode: got 1000000000, expected a number from 0 to 499"):
+        env.reset(test_episode=10**9)
     assert env.move(direction="left") == "The episode is over. Reply without calling a tool."
 
 
