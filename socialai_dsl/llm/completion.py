@@ -193,13 +193,13 @@ def _json(content: bytes) -> Any:
     """JSON, with what no text can hold replaced; None if it is not."""
     try:
         text = content.decode("utf-8-sig", errors="replace")
-        return json.loads(text, object_hook=_storable)
+        return json.loads(text, object_hook=storable)
     except (ValueError, RecursionError):
         return None
 
 
-def _storable(found: dict[str, Any]) -> dict[str, Any]:
-    """An object whose texts can be written to a file: halves of characters, which JSON can hold, are replaced."""
+def storable(found: dict[str, Any]) -> dict[str, Any]:
+    """An object of JSON whose texts can be written: halves of characters, which JSON can hold, are replaced."""
     return {key: _whole(value) for key, value in found.items()}
 
 

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.draws import MAX_SEED
+from socialai_dsl.llm.completion import storable
 from socialai_dsl.llm.episode import TEST_SET
 
 IDLE: Final = 900.0
@@ -95,9 +96,12 @@ class Gate:
             session = _Session(receive, send, self._idle, scope["path"].endswith(_SESSIONS))
             return await self._app(scope, session.receive, session.send)
         body = await _body(receive)
-        wrong = _wrong_body(scope["path"], body)
-        if wrong is not None:
-            return await _refuse(scope, send, *wrong)
+        if body is None:
+            return await _refuse(scope, send, 413, f"got a body of more than {MOST_BYTES} bytes")
+        try:
+            body = _checked_body(scope["path"], body)
+        except ValueError as error:
+            return await _refuse(scope, send, 422, sentence(error))
         whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
         async def again() -> Message:
@@ -143,11 +147,13 @@ class _Session:
                 reason = f"the session was silent for {self._idle:g} s"
                 await self.send({"type": "websocket.close", "code": _GONE, "reason": reason})
                 break
-            wrong = _wrong_message(message, self._plays) if message["type"] == "websocket.receive" else None
-            if wrong is None:
+            if message["type"] != "websocket.receive":
                 return message
-            told = {"type": "error", "data": {"message": wrong, "code": "VALIDATION_ERROR"}}
-            await self.send({"type": "websocket.send", "text": json.dumps(told)})
+            try:
+                return {"type": "websocket.receive", "text": _checked_message(message, self._plays)}
+            except ValueError as error:
+                told = {"type": "error", "data": {"message": sentence(error), "code": "VALIDATION_ERROR"}}
+                await self.send({"type": "websocket.send", "text": json.dumps(told)})
         return {"type": "websocket.disconnect", "code": _GONE}
 
     async def send(self, message: Message) -> None:
@@ -165,50 +171,52 @@ def _host(address: str) -> str | None:
         return None
 
 
-def _wrong_message(message: Message, plays: bool) -> str | None:
-    """What is wrong with a message of a session; None if nothing is."""
+def _checked_message(message: Message, plays: bool) -> str:
+    """A message of a session as JSON. Raises ValueError if it is none."""
     text = message.get("text")
     if text is None:
-        return "got bytes, expected text"
+        raise ValueError("got bytes, expected text")
     if len(text) > MOST_BYTES:
-        return f"got {len(text)} characters, expected at most {MOST_BYTES}"
-    try:
-        found = _json(text)
-        kind = _Playing.model_validate(found).type if plays else None
-        if kind == "reset":
-            Beginning.model_validate(found.get("data", {}))
-        elif kind == "step":
-            _Played.model_validate(found)
-    except ValueError as error:
-        return sentence(error)
-    return None
+        raise ValueError(f"got {len(text)} characters, expected at most {MOST_BYTES}")
+    found = _json(text)
+    kind = _Playing.model_validate(found).type if plays else None
+    if kind == "reset":
+        Beginning.model_validate(found.get("data", {}))
+    elif kind == "step":
+        _Played.model_validate(found)
+    elif kind in ("state", "close") and "data" in found:
+        raise ValueError("data: there is no such key")
+    return _written(found)
 
 
-def _wrong_body(path: str, body: bytes | None) -> tuple[int, str] | None:
-    """The status and sentence for the body of a request; None if nothing is wrong with it."""
-    if body is None:
-        return 413, f"got a body of more than {MOST_BYTES} bytes"
+def _checked_body(path: str, body: bytes) -> bytes:
+    """The body of a request as JSON; one without a body stays so. Raises ValueError if it is none."""
     if not body.strip():
-        return None
-    try:
-        found = _json(body)
-        if path.endswith("/reset"):
-            Beginning.model_validate(found)
-        if path.endswith("/step"):
-            _Step.model_validate(found)
-    except ValueError as error:
-        return 422, sentence(error)
-    return None
+        return body
+    found = _json(body)
+    if path.endswith("/reset"):
+        Beginning.model_validate(found)
+    if path.endswith("/step"):
+        _Step.model_validate(found)
+    return _written(found).encode()
 
 
 def _json(text: str | bytes) -> Any:
     """What JSON says. Raises ValueError if it is none."""
     try:
-        return json.loads(text, parse_constant=_no_number)
+        return json.loads(text, parse_constant=_no_number, object_hook=storable)
     except RecursionError:
         raise ValueError("got JSON that is nested too deep") from None
     except ValueError as error:
         raise ValueError(f"got what is no JSON ({error})") from None
+
+
+def _written(found: Any) -> str:
+    """What was read, as JSON. Raises ValueError where that has no number for it, such as for 1e999."""
+    try:
+        return json.dumps(found, allow_nan=False)
+    except RecursionError:
+        raise ValueError("got JSON that is nested too deep") from None
 
 
 def _no_number(name: str) -> None:

@@ -117,6 +117,7 @@ WRONG = [
     (b'{"sead": 7}', "sead: there is no such key"),
     (b"[1]", "got [1], expected an object"),
     (b'{"seed": NaN}', "NaN is no number"),
+    (b'{"seed": 1e999}', "seed: got inf"),
     (b"[" * 100_000, "nested too deep"),
     (b"{", "got what is no JSON"),
     (b"\xff\xfe", "got what is no JSON"),
@@ -140,12 +141,24 @@ def test_what_is_right_passes_as_it_is() -> None:
     assert posted(b'{"action": {"message": "Act: left"}}', "/step")[0] == 200
     assert posted(b'{"action": 7}', "/step") == (422, '{"detail": "action: got 7, expected an object"}')
     assert posted(b"x" * (MOST_BYTES + 1))[0] == 413
-    step = json.dumps({"type": "step", "data": {"message": "\ud800"}})
+    step = '{"type": "step", "data": {"message": "\\ud800"}}'
     assert said('{"type": "reset", "data": {"seed": 1}}', step, '{"type": "state"}') == ["played"] * 3
+    assert posted(b'{"episode_id": "\\ud800"}') == (200, '{"episode_id": "?"}'), "half a character is none"
 
 
 @pytest.mark.parametrize(
-    "odd", ["{", "7", "null", "[]", b"\x00\xff", '{"type": "fly"}', '{"type": "step"}', "[" * 99_999]
+    "odd",
+    [
+        "{",
+        "7",
+        "null",
+        "[]",
+        '{"type": "state", "data": {}}',
+        b"\x00\xff",
+        '{"type": "fly"}',
+        '{"type": "step"}',
+        "[" * 99_999,
+    ],
 )
 def test_what_is_no_message_is_answered_and_the_session_goes_on(odd: Any) -> None:
     answer, again = said(odd, '{"type": "state"}')
