@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from socialai_dsl.llm.gate import MOST_BYTES, Gate
+from socialai_dsl.cli.main import main
+from socialai_dsl.llm.gate import IDLE, MOST_BYTES, Gate
 
 KNOWN = ((b"host", b"localhost:8000"),)
 
@@ -133,6 +134,11 @@ def test_a_wrong_beginning_is_answered_with_what_is_wrong(body: bytes, wrong: st
         (answer, again) = said(f'{{"type": "reset", "data": {body.decode()}}}', '{"type": "reset"}')
         assert json.loads(answer)["data"]["code"] == "VALIDATION_ERROR"
         assert again == "played"
+
+
+def test_the_help_names_the_time_of_silence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", "--help"]) == 0
+    assert f"(default: {IDLE:g})" in " ".join(capsys.readouterr().out.split())
 
 
 def test_what_is_right_passes_as_it_is() -> None:
