@@ -84,7 +84,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         self._id: str | None = None
         self._seed: int | None = None
         self._test_episode: int | None = None
-        self._begun = False
+        self._begun = self._ended = False
 
     def reset(
         self,
@@ -101,8 +101,12 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
             test_episode: number of an episode of the test set.
 
         Raises:
-            ValueError: a number is out of range.
+            ValueError: a number is out of range, or the session has ended.
         """
+        if self._ended:
+            raise ValueError(
+                "reset: nothing was played in this session for too long; expected a new connection"
+            )
         if test_episode is None and seed is None:
             seed = randbelow(_SEEDS)
         text = self._episode.reset(seed, test_episode)
@@ -139,7 +143,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
 
     def close(self) -> None:
         """Let the environment go."""
-        self._begun = False
+        self._begun, self._ended = False, True
         self._episode.close()
 
 

@@ -86,6 +86,15 @@ def test_a_request_that_cannot_be_done_is_answered_with_a_sentence(client: TestC
         pass
 
 
+def test_a_session_that_lost_its_place_says_so(openenv: Any) -> None:
+    env = openenv.ScenarioEnvironment(playable_of("talkitout"), "prose")
+    env.reset(seed=7)
+    env.close()
+    for act in (env.reset, lambda: env.step(openenv.Reply(message="Act: left"))):
+        with pytest.raises(ValueError, match=r"expected a (new connection|reset first)"):
+            act()
+
+
 @pytest.mark.parametrize(
     ("action", "message"),
     [
