@@ -11,7 +11,7 @@ from itertools import dropwhile, islice
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 from socialai_dsl.diagnostics import bounded_suggestions, printable, suggested
-from socialai_dsl.llm.replies import conclusion, lines_of, mark, readable
+from socialai_dsl.llm.replies import conclusion, lines_of, mark, plain, readable
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.vocabulary import NOUN, words
 
@@ -187,10 +187,7 @@ class ActionLanguage:
             return self._wrong("no tool was called")
         together = Action()
         for call in calls:
-            try:
-                arguments = json.loads(call.arguments or "{}")
-            except (ValueError, RecursionError):
-                arguments = None
+            arguments = _object(call.arguments or "{}")
             if not isinstance(arguments, dict) or call.name not in ("move", "say"):
                 return self._wrong(f"{_cited(call.name)} with {_cited(call.arguments)} is no call of a tool")
             parsed = self._arguments(arguments)
@@ -283,7 +280,12 @@ class ActionLanguage:
         bare = content.strip(" \t`*_\"'“”.,;!")
         if bare in self._exact and tuple(words(bare)) not in self._movements:
             return Action(None, bare)
-        quoted = [(found, self._sentence(found[1] or found[2])) for found in _QUOTATION.finditer(content)]
+        quotations = ((found, found[1] or found[2]) for found in _QUOTATION.finditer(content))
+        quoted = [
+            (found, self._sentence(text))
+            for found, text in quotations
+            if tuple(words(text)) not in self._movements
+        ]
         if any(sentence is not None for _, sentence in quoted):
             return self._with_quotations(content, quoted)
         said = _without_fillers(words(content))
@@ -334,8 +336,9 @@ class ActionLanguage:
 
     def _arguments(self, given: Mapping[str, Any]) -> Parsed:
         """Read a JSON object: `move` and `say`, or the arguments of a tool."""
-        if isinstance(inner := given.get("arguments", given.get("parameters")), dict):
-            given = inner
+        inner = given.get("arguments", given.get("parameters"))
+        inner = _object(inner) if isinstance(inner, str) else inner
+        given = inner if isinstance(inner, dict) else given
         moves = [given[key] for key in ("move", "direction", "action", "movement") if given.get(key)]
         spoken = next((given[key] for key in ("say", "sentence", "utterance") if given.get(key)), None)
         if spoken is None and isinstance(given.get("template"), str):
@@ -407,6 +410,14 @@ def _action(movement: str) -> Action:
 def _text(given: Any, otherwise: str = "") -> str:
     """What was given, if it is a text that can be an action."""
     return given[: 10 * _QUOTED] if isinstance(given, str) else otherwise
+
+
+def _object(text: str) -> Any:
+    """What JSON says; None if it is none."""
+    try:
+        return json.loads(text, object_pairs_hook=plain)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _without_fillers(said: Sequence[str]) -> list[str]:

@@ -57,10 +57,12 @@ _TAG: Final = re.compile(
 )
 _MOST_TAGS: Final = 500
 """The most tags that are read outside of thoughts; a reply with more of them says nothing."""
+_NEXT_TURN: Final = re.compile(r"^[#* ]{0,6}(?:User|Human)\**:", re.MULTILINE)
+"""Where a model goes on with what others say, without a token."""
 _MARKUP: Final = " `*_\t"
 _COLON: Final = "[:：﹕∶꞉]"
 _BEFORE_A_MARK: Final = re.compile(
-    r"(?:^[^\w\n]{0,20}|[.!?…:：;)\]>|–—→-][ \t*_`]{0,10})"
+    r"(?:^(?:[^\w\n]|_){0,20}|[.!?…:：;)\]>|–—→-][ \t*_`]{0,10})"
     r"(?:(?:so|therefore|thus|my|the|final|chosen)[ \t]{1,3}){0,4}(?<![\"'“‘{])\Z",
     re.IGNORECASE,
 )
@@ -125,6 +127,9 @@ def readable(reply: str, word: str) -> str:
         word: of the mark that stands for a tag such as `<answer>`.
     """
     text = _without_tags(_without_analysis(reply), word)
+    others = _NEXT_TURN.search(text)
+    if others is not None and text[: others.start()].strip():
+        text = text[: others.start()]
     if len(text) > _READ:
         # Half a line might mean something else.
         text = text[-_READ:].partition("\n")[2]
@@ -259,11 +264,19 @@ def _objects(text: str) -> Iterator[Place]:
             spans.append((start, found.end()))
     for start, end in spans[-_LOOKED_AT:]:
         try:
-            found_object = json.loads(text[start:end])
+            found_object = json.loads(text[start:end], object_pairs_hook=plain)
         except (ValueError, RecursionError):
             continue
         if found_object:
             yield start, end, found_object
+
+
+def plain(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; a key that is given two values has a list of both, which is no action."""
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        found[key] = [found[key], value] if key in found and found[key] != value else value
+    return found
 
 
 def _are_inner(found: Sequence[Place]) -> Iterator[bool]:

@@ -90,6 +90,10 @@ THOUGHTS = (
         ('{"move": "left", "say": "none"}', Action("left")),
         (f'Act: say "{EXIT}" and wait for an answer', Action(None, EXIT)),
         ("My last action: right\nAct: left", Action("left")),
+        ("__Act__: left", Action("left")),
+        (f'Act: "left", say "{EXIT}"', Action("left", EXIT)),
+        ('{"name": "move", "arguments": "{\\"direction\\": \\"left\\"}"}', Action("left")),
+        ("Act: left\n\nUser: You see a wall.\nAct: right", Action("left")),
         ("<answer>Act: left</answer>", Action("left")),
         ("<answer>\nleft\n</answer>", Action("left")),
         ("So \\boxed{left}", Action("left")),
@@ -155,6 +159,7 @@ def test_what_models_write_is_understood(reply: str, action: Action) -> None:
         ("Previous action: left. It failed.", "is no action"),
         ("I could do Act: left", "is no action"),
         ('{"move": ["left"]}', "is no movement"),
+        ('{"move": "left", "move": "right"}', "is no movement"),
     ],
 )
 def test_what_is_not_understood_is_answered_with_what_is_possible(reply: str, wrong: str) -> None:
