@@ -106,11 +106,13 @@ def _named(text: str, answers: Sequence[str]) -> str | None:
     for spelt, answer in wanted:
         if spelt:
             beginning.setdefault(spelt[0], []).append((spelt, answer))
-    said, found, at = _words(text), set[str](), 0
-    while at < len(said):
-        here = [one for one in beginning.get(said[at], ()) if said[at : at + len(one[0])] == one[0]]
-        found |= {answer for _, answer in here[:1]}
-        at += len(here[0][0]) if here else 1
+    said, found, end = _words(text), set[str](), 0
+    for at in (at for at, word in enumerate(said) if word in beginning):
+        here = [one for one in beginning[said[at]] if said[at : at + len(one[0])] == one[0]]
+        if here and at >= end:
+            spelt, answer = here[0]
+            found.add(answer)
+            end = at + len(spelt)
     if not found:
         found = {answer for answer in answers if answer.strip() == text.strip()}
     return found.pop() if len(found) == 1 else None
