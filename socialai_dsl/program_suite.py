@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from itertools import chain
-from typing import Any
+from typing import Any, Self
 
 from socialai_dsl.program import CHANNELS, Outcome, Program
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
@@ -46,6 +46,10 @@ class ProgramSuite:
     weights: tuple[int, ...] = ()
     starts: tuple[Mapping[str, Any] | None, ...] = ()
     in_sequence: bool = False
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Itself: nothing changes it."""
+        return self
 
     @property
     def templates(self) -> tuple[str, ...]:

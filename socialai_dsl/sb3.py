@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from copy import deepcopy
+from typing import Any, Self
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -33,6 +34,10 @@ class SB3VecEnv(VecEnv):
         self.envs = envs
         self._actions: NDArray[np.int64] = np.zeros((), np.int64)
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def __copy__(self) -> Self:
+        """A copy with environments of its own."""
+        return deepcopy(self)
 
     def reset(self) -> dict[str, NDArray[Any]]:
         """Start all episodes, with the seed of `seed()` if it was called since the last reset."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, 
 
 _PLAIN_CHANNELS: Final = 4
 _TWO_GESTURES: Final = 2
+
+_Arrays = TypeVar("_Arrays", Tables, State, Ports)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,22 @@ class Batch:
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         self._pool_starts = starts.tolist()
         self._names = [program.name for program in programs]
+        self._note_addresses()
+
+    def _note_addresses(self) -> None:
+        """Tell the engine where the arrays are."""
         self._book = make_book((*self.tables, *self.state, *self.ports, self.ports.actions.reshape(-1)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the addresses, which mean something in this process and to this batch alone."""
+        return {name: value for name, value in vars(self).items() if name != "_book"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Be a copy with arrays of its own: those that come may be another batch's, or must not be written to."""
+        vars(self).update(state)
+        self.tables, self.state, self.ports = map(_own_arrays, (self.tables, self.state, self.ports))
+        self.counters = self.ports.counters
+        self._note_addresses()
 
     def program_numbers(self) -> NDArray[np.intp]:
         """Which program each row plays, (E,)."""
@@ -195,6 +212,11 @@ class Batch:
             f"{self._names[int(self.program_numbers()[row])]}: none of {ATTEMPTS} rooms was as `require` asks, in row "
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )
+
+
+def _own_arrays(arrays: _Arrays) -> _Arrays:
+    """Copies of arrays, as the engine takes them."""
+    return arrays._make(np.array(array, order="C") for array in arrays)
 
 
 def _board_words(program: Program) -> int:

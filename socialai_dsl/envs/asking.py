@@ -19,6 +19,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
@@ -62,7 +63,7 @@ def _called(member: str | None, probe: str) -> str:
     return probe if member is None else f"{member}: {probe}"
 
 
-class Asker:
+class Asker(Copied):
     """Follows the episodes of one environment and says what probes ask.
 
     Attributes:
@@ -144,8 +145,13 @@ class _Looker:
         self._table = Table([program], 1)
         self._table.batch.ports.actions[0] = 0
         self._table.batch.ports.actions[0, 0] = len(program.actions)
-        self._registers = self._table.state.registers[0]
         self._remembered = [name.register for name in program.registers if name.path.startswith(NOTED)]
+
+    @property
+    def _registers(self) -> NDArray[np.int16]:
+        """Those of the moment looked at, int16 (R,)."""
+        registers: NDArray[np.int16] = self._table.state.registers[0]
+        return registers
 
     def look(self, moment: Start, begins: bool) -> None:
         """Let the program note what it asks about at a moment; before the first step `prev(e)` is what e is now."""

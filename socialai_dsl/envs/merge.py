@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from gymnasium import spaces
@@ -46,6 +47,10 @@ class CommonSpace:
     parts: tuple[LinkedProgram, ...]
     channels: tuple[str, ...]
     highest: tuple[int, ...]
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Itself: nothing changes it."""
+        return self
 
     @classmethod
     def of(cls, playables: Sequence[Playable]) -> CommonSpace:

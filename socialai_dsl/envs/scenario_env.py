@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.explain import Explainer, Recording
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
 from socialai_dsl.envs.table import Table
@@ -121,7 +122,13 @@ _HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
 _INT64 = np.dtype(np.int64)
 
 
-class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
+_LOOK_INTO_MEMORY = frozenset(
+    "_copy_image _copy_tokens _registers _numbers _key _action _reward _success _play".split()
+)
+"""What `ScenarioEnv._find_row` finds."""
+
+
+class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
     """One environment of a scenario or suite.
 
     **Observation.** `image`, uint8 (7, 7, C): `image[i, j]` counts i from the agent's left to its right and j from far
@@ -170,15 +177,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._shape = self.action_space.nvec.shape
         self._suite = isinstance(program, ProgramSuite)
         self._acts = isinstance(program, ProgramSuite) and program.in_sequence
-        # What a step needs of one row, looked up once: asking an array takes longer than the engine takes for a step.
-        ports = self._table.batch.ports
-        self._copy_image, self._copy_tokens = self._table.image[0].copy, self._table.tokens[0].copy
-        self._registers = self._table.state.registers[0]
-        self._numbers = self._registers.data
-        self._key = self._table.state.keys[0].data
-        self._action = ports.actions[0].data.cast("B")
-        self._reward, self._success = ports.reward.data, ports.success.data
-        self._play = self._table.stepper(Task.STEP_ONLY)
+        self._find_row()
         self._history = ""
         self._ended = True
         self._act = 0
@@ -188,6 +187,27 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._last_act: Recording | None = None
         self._explainers: dict[str, Explainer] = {}
         self._scenarios = tuple(scenarios)
+
+    def _find_row(self) -> None:
+        """Look up what a step needs of the one row: asking an array takes longer than the engine takes for a step."""
+        ports = self._table.batch.ports
+        self._copy_image, self._copy_tokens = self._table.image[0].copy, self._table.tokens[0].copy
+        self._registers = self._table.state.registers[0]
+        self._numbers = self._registers.data
+        self._key = self._table.state.keys[0].data
+        self._action = ports.actions[0].data.cast("B")
+        self._reward, self._success = ports.reward.data, ports.success.data
+        self._play = self._table.stepper(Task.STEP_ONLY)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what looks into memory, and what is made anew when it is needed."""
+        kept = {name: value for name, value in vars(self).items() if name not in _LOOK_INTO_MEMORY}
+        return kept | {"_explainers": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Be a copy, which looks into its own memory."""
+        vars(self).update(state)
+        self._find_row()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -16,6 +16,7 @@ from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
+from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.describe import describe, history
 from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.envs.merge import CommonSpace
@@ -125,7 +126,7 @@ class Start(NamedTuple):
     key: NDArray[np.uint64]
 
 
-class Table:
+class Table(Copied):
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
     Attributes:
@@ -146,12 +147,9 @@ class Table:
             self.merged.length,
             [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
         )
-        self.state, self.rows = self.batch.state, rows
+        self.rows = rows
         self.channels = len(self.merged.channels)
-        self.image = in_bytes(
-            self.batch.ports.picture if self.batch.more else self.state.image, self.channels
-        )
-        self.tokens = self.state.tokens
+        self._find_buffers()
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
         self._texts = [_numbers_of_texts(program.lines) for program in self.programs]
@@ -161,6 +159,21 @@ class Table:
         for pool, playable in enumerate(different):
             if isinstance(playable, ProgramSuite) and playable.weights and not playable.in_sequence:
                 self.batch.set_weights(pool, playable.weights)
+
+    def _find_buffers(self) -> None:
+        """Look up the arrays of the batch that callers see."""
+        self.state = self.batch.state
+        picture = self.batch.ports.picture if self.batch.more else self.state.image
+        self.image, self.tokens = in_bytes(picture, self.channels), self.state.tokens
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what looks into the memory of the batch."""
+        return {name: value for name, value in vars(self).items() if name not in ("state", "image", "tokens")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Be a copy, which looks into its own batch."""
+        vars(self).update(state)
+        self._find_buffers()
 
     # --- playing ---
 

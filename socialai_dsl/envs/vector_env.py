@@ -11,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table, joined
 from socialai_dsl.program import Program
@@ -26,7 +27,7 @@ _MODES = {mode.value.lower(): mode for mode in AutoresetMode}
 Observation = dict[str, NDArray[Any]]
 
 
-class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
+class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
     """A batch of E environments of one scenario or suite, or of several in turn.
 
     **Observation.** `image`, uint8 (E, 7, 7, C): `image[e, i, j]` counts i from the agent's left to its right and j

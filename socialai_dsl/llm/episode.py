@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import make
 from socialai_dsl.envs.asking import Asker, Question
+from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.factory import Scenario
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
@@ -87,7 +88,7 @@ class EpisodeResult:
     stopped: int = 0
 
 
-class Episode:
+class Episode(Copied):
     """One environment, played in text, episode after episode.
 
     Args:

@@ -70,6 +70,14 @@ class TextView:
         self._language = ActionLanguage(program)
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what was described so far, which copies describe anew."""
+        return {name: value for name, value in vars(self).items() if name != "_described"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._described = lru_cache(_REMEMBERED)(self._describe)
+
     def instructions(self, mode: Mode = "text", goal: str = "") -> str:
         """The possible sights, actions and utterances, and the form of a reply, without a word on the solution.
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
-from typing import Final
+from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -141,6 +141,10 @@ class Program:
     source_map: Sequence[Span | None] = field(repr=False)
     labels: Mapping[int, str] = field(repr=False)
     looks: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Itself: nothing changes it."""
+        return self
 
     def header(self, word: Header) -> int:
         """One word of the header."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final, Literal
+from typing import Any, Final, Literal, Self
 
 from socialai_dsl.semantics.terms import (
     Line,
@@ -537,6 +537,10 @@ class CheckedScenario:
     readings: Readings | None = field(default=None, compare=False, repr=False)
     addressing: tuple[str, tuple[int, ...]] | None = None
     overheard: bool = True
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Itself: nothing changes it."""
+        return self
 
     @property
     def causing(self) -> tuple[RulePlan | StepPlan, ...]:

@@ -684,7 +684,7 @@ def is_own_noun(term: Term) -> bool:
 Entry = Rule | Step | WorldRule | Outcome
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False)
 class Reading:
     """A part of an expression: how it was written, what it means, and the parts it is made of.
 
