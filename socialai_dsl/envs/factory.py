@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
 from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.compilation import compile_loaded, scenarios_of
+from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.starts import check_starts
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
@@ -36,18 +37,21 @@ def compiled(loaded: Loaded) -> Playable:
     return playable
 
 
-def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
+def make(scenario: Scenario, render_mode: str | None = None, **unknown: Never) -> ScenarioEnv:
     """One environment of a scenario or suite: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
 
     Args:
         scenario: a shipped name or the path of a file, with variants (`+unsocial`) and parameters (`?n=2`); or what
             `compile` returned.
         render_mode: see `ScenarioEnv`.
+        **unknown: there are no other options; one is refused by its name.
 
     Raises:
         ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
-        ValueError: there is no such render mode.
+        ValueError: an argument is not what was expected, or there is no such option.
     """
+    _refuse_unknown("make", unknown, ("scenario", "render_mode"))
+    _check_scenario(scenario)
     if isinstance(scenario, Playable):
         return ScenarioEnv(scenario, render_mode)
     loaded = load(scenario)
@@ -61,6 +65,7 @@ def make_vec(
     autoreset_mode: str | AutoresetMode = "NextStep",
     copy: bool = True,
     render_mode: str | None = None,
+    **unknown: Never,
 ) -> ScenarioVectorEnv:
     """A batch of environments: one scenario or suite, or several in turn.
 
@@ -71,23 +76,48 @@ def make_vec(
         autoreset_mode: `NextStep`, `SameStep` or `Disabled`.
         copy: False returns the engine's own buffers, valid until the next call.
         render_mode: `rgb_array`, `ansi` or None.
+        **unknown: there are no other options; one is refused by its name.
 
     Raises:
         ScenarioError: a scenario does not exist or has mistakes.
-        ValueError: an argument is not what was expected.
+        ValueError: an argument is not what was expected, or there is no such option.
     """
-    names = [scenario] if isinstance(scenario, str | Path | Playable) else list(scenario)
+    _refuse_unknown("make_vec", unknown, _OPTIONS_OF_BATCHES)
+    is_one = isinstance(scenario, str | bytes | Path | Playable) or not isinstance(scenario, Sequence)
+    names: list[Any] = [scenario] if is_one else list(scenario)  # type: ignore[arg-type]
+    for name in names:
+        _check_scenario(name)
     made = {name: playable_of(name) for name in dict.fromkeys(names)}
     return ScenarioVectorEnv(
         [made[name] for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode
     )
 
 
-def make_env(scenario: Scenario, render_mode: str | None = None, **_: Any) -> ScenarioEnv:
+_OPTIONS_OF_BATCHES = ("scenario", "num_envs", "num_threads", "autoreset_mode", "copy", "render_mode")
+
+
+def make_env(scenario: Scenario, render_mode: str | None = None, **unknown: Any) -> ScenarioEnv:
     """Gymnasium's entry point for a single environment."""
-    return make(scenario, render_mode)
+    return make(scenario, render_mode, **unknown)
 
 
 def make_vector_env(scenario: Scenario, num_envs: int = 1, **options: Any) -> ScenarioVectorEnv:
     """Gymnasium's entry point for a vector environment."""
+    if "max_episode_steps" in options:
+        raise ValueError(
+            f"max_episode_steps: got {options['max_episode_steps']!r}, but in a batch an episode lasts as long as its "
+            "scenario says; expected no such option, or vectorization_mode='sync' beside it"
+        )
     return make_vec(scenario, num_envs, **options)
+
+
+def _check_scenario(scenario: Any) -> None:
+    if not isinstance(scenario, str | Path | Playable):
+        raise ValueError(f"scenario: got {scenario!r}; expected a name, a path, or what `compile` returns")
+
+
+def _refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str]) -> None:
+    """What looks like an option may be meant as a parameter of the scenario."""
+    first = next(iter(unknown.items()), ("", ""))
+    named = f"; a parameter of a scenario is part of its name: 'NAME?{first[0]}={first[1]}'"
+    refuse_unknown(call, unknown, known, named)

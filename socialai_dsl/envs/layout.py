@@ -115,7 +115,7 @@ _KEYS = {
 _OTHER_KEYS = ("t", "room", "one_of", "let", "state", "memory", "last", "heard", "pending")
 
 
-def pins_of(program: Program, layout: Mapping[str, Any], in_suite: bool = False) -> NDArray[np.int16]:
+def pins_of(program: Program, layout: Mapping[str, Any], others: Sequence[str] = ()) -> NDArray[np.int16]:
     """Pinned registers, int16 (R,): the value of each register that the layout gives, PIN_NONE for the others.
 
     Only the shape of a layout is checked: things lie on the grid and not on each other, words and lengths are known.
@@ -123,20 +123,20 @@ def pins_of(program: Program, layout: Mapping[str, Any], in_suite: bool = False)
     Args:
         program: the scenario that is played.
         layout: in the scenario's own names.
-        in_suite: whether the layout may have a key `member`, which is the caller's affair.
+        others: keys that the layout may also have, `member` and `spoiled`; what `member` says is the caller's affair.
 
     Raises:
         ValueError: naming the key at fault, what was got and what was expected.
     """
-    return _Layout(program, in_suite).pins(layout)
+    return _Layout(program, others).pins(layout)
 
 
 class _Layout:
-    def __init__(self, program: Program, in_suite: bool) -> None:
+    def __init__(self, program: Program, others: Sequence[str]) -> None:
         self.program = program
         self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
         self.addresses = addresses_of(program)
-        self.others = ("member", "spoiled", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
+        self.others = (*others, *_OTHER_KEYS)
         self.names = [str(entity) for entity in program.entities]
         self.groups: dict[str, list[int]] = {}
         self.carried: dict[int, Any] = {}
@@ -148,6 +148,8 @@ class _Layout:
         for key in layout:
             if key not in self.groups and key not in self.others:
                 raise ValueError(f"layout: there is no {key!r}{meant(key, [*self.groups, *self.others])}")
+        if layout.get("spoiled") is not None:
+            _flag("spoiled", layout["spoiled"])
         self.width, self.height = self._room(layout.get("room"))
         if layout.get("t") is not None:
             self.row[Register.T] = whole_number("t", layout["t"], 0, self.program.header(Header.HORIZON) - 1)
@@ -166,7 +168,7 @@ class _Layout:
 
     def _entries(self, key: str, given: Any) -> Iterator[tuple[str, Any]]:
         """The entries of a mapping, none where nothing is given."""
-        if given:
+        if given is not None:
             self._mapping(key, given)
             yield from given.items()
 
@@ -180,7 +182,7 @@ class _Layout:
         h = self.program.header
         least = h(Header.MIN_WIDTH), h(Header.MIN_HEIGHT)
         most = h(Header.CANVAS_WIDTH), h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1
-        if not room:
+        if room is None:
             return least
         self._mapping("room", room)
         sizes = list(least)
@@ -194,13 +196,13 @@ class _Layout:
     # --- cast and objects ---
 
     def _group(self, key: str, numbers: list[int], given: Any) -> None:
-        if not given:
+        if given is None:
             return
         if self.program.entities[numbers[0]].index is None:
             self._entity(key, numbers[0], given)
             return
         for i, (number, one) in enumerate(zip(numbers, _listed(key, given, len(numbers)), strict=False)):
-            if one:
+            if one is not None:
                 self._entity(f"{key}[{i}]", number, one)
 
     def _entity(self, key: str, number: int, given: Any) -> None:
@@ -226,7 +228,12 @@ class _Layout:
         inside = given.get("inside")
         if inside is not None:
             self._set(number, Field.INSIDE, word(f"{key}.inside", inside, self.names))
-        if given.get("gone") or (inside is not None and given.get("at") is None):
+        gone = _flag(f"{key}.gone", given.get("gone"))
+        if gone and given.get("at") is not None:
+            raise ValueError(
+                f"{key}.at: got {given['at']!r}, but {key}.gone is True; expected one of the two"
+            )
+        if gone or (inside is not None and given.get("at") is None):
             for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1)):
                 self._set(number, field, value)
         elif given.get("at") is not None:
@@ -234,7 +241,7 @@ class _Layout:
 
     def _gestures(self, key: str, number: int, given: Mapping[str, Any]) -> None:
         """What an NPC did last, where it points, and whether it was poked."""
-        if given.get("poked"):
+        if _flag(f"{key}.poked", given.get("poked")):
             self._set(number, Field.POKED, 1)
         if given.get("last") is not None:
             self._set(number, Field.LAST, word(f"{key}.last", given["last"], TURN_WORDS))
@@ -384,7 +391,7 @@ class _Layout:
 
     def _last(self, given: Any) -> None:
         """What the agent did in the last step."""
-        if not given:
+        if given is None:
             return
         self._mapping("last", given)
         _only("last", given, ("action", "said", "poked"))
@@ -408,7 +415,7 @@ class _Layout:
     # --- what was heard ---
 
     def _heard(self, given: Any) -> None:
-        if not given:
+        if given is None:
             return
         if not isinstance(given, Sequence) or isinstance(given, str):
             raise ValueError(f"heard: got {given!r}; expected a list of lines")
@@ -465,6 +472,11 @@ def _only(key: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:
     for name in given:
         if name not in allowed:
             raise ValueError(f"{key}: there is no {name!r}{meant(name, allowed)}")
+
+
+def _flag(key: str, given: Any) -> bool:
+    """True or False; None is False. Raises ValueError that names the key for anything else."""
+    return given is not None and bool(word(key, given, (False, True)))
 
 
 def _listed(key: str, given: Any, most: int) -> Sequence[Any]:

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.diagnostics import suggested
+from socialai_dsl.draws import MAX_SEED
 from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.explain import Explainer, Recording
+from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
 from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.values import whole_number
 from socialai_dsl.envs.view import View
 from socialai_dsl.program import FIRST_ENTITY, EntityName, Field, Flag, Header, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, words_of_looks
@@ -166,11 +169,10 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
     def __init__(
         self, program: Playable, render_mode: str | None = None, scenarios: Sequence[CheckedScenario] = ()
     ) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            modes = ", ".join(self.metadata["render_modes"])
-            raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {modes}")
+        if not isinstance(program, Playable):
+            raise ValueError(f"program: got {program!r}; expected what `compile` returns")
         self.program = program
-        self.render_mode = render_mode
+        self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
         self._table = Table([program], 1)
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
@@ -217,9 +219,10 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         Options:
 
         * `layout`, a mapping: starts from a known room; what the layout leaves out is drawn.
-        * `test_episode`, an int: plays this episode of a domain that no seed reaches; 0 to 499 are the fixed test set.
-        * `index`, an int: plays as environment `index` of a vector environment with this seed.
-        * `reset_mask`, one boolean: False leaves the episode as it is.
+        * `test_episode`, an int, without a seed: plays this episode of a domain that no seed reaches; 0 to 499 are the
+          fixed test set.
+        * `index`, an int, with a seed: plays as environment `index` of a vector environment with this seed.
+        * `reset_mask`, one boolean: False leaves the episode as it is; not in the first reset.
 
         Args:
             seed: starts episode 0 of this seed. Without it the next episode follows; the first reset then draws a seed
@@ -230,11 +233,12 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             The observation and the info.
 
         Raises:
-            ValueError: the seed, an option or the layout is not what was expected.
+            ValueError: the seed, an option or the layout is not what was expected, or says nothing beside another.
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
-        super().reset(seed=seed)
+        seed = None if seed is None else whole_number("seed", seed, 0, MAX_SEED)
         self._table.reset(seed, options)
+        super().reset(seed=seed)
         self._ended = bool(self._registers[Register.ENDED])  # still so where `reset_mask` is False
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
@@ -259,7 +263,10 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         if self._ended:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
-        given = action if isinstance(action, np.ndarray) else np.asarray(action)
+        try:
+            given = action if isinstance(action, np.ndarray) else np.asarray(action)
+        except ValueError:  # lists of different lengths
+            raise self._refusal(action) from None
         if given.shape != self._shape or given.dtype is not _INT64:
             given = self._converted(action, given)
         self._action[:] = words = given.tobytes()
@@ -417,9 +424,14 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._table.counters()
 
     def render(self) -> Any:
-        """The room, by `render_mode`: uint8 (H, W, 3), text, or printed; without a mode, None."""
+        """The room, by `render_mode`: uint8 (H, W, 3), text, or printed; without a mode, None.
+
+        Raises:
+            ValueError: there was no reset yet.
+        """
         if self.render_mode is None:
             return None
+        self._table.look("render")
         if self.render_mode == "rgb_array":
             return frame(self._table, 0, "rgb_array")
         text = frame(self._table, 0, "ansi")
@@ -441,10 +453,12 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def plain_text(self) -> str:
         """The room as text, two characters for each cell, without colours."""
+        self._table.look("plain_text")
         return plain_text(self._table, 0)
 
     def coloured_text(self) -> str:
         """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""
+        self._table.look("coloured_text")
         return coloured_text(self._table, 0)
 
     def view(self, image: NDArray[np.uint8]) -> View:
@@ -455,15 +469,18 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def scene(self) -> Scene:
         """The content of a picture of the room now."""
+        self._table.look("scene")
         return scene(self._table, 0)
 
     def looks_of_npcs(self) -> dict[EntityName, Code]:
         """The look of each NPC, as if it looked down; also of those that have left or are hidden."""
+        self._table.look("looks_of_npcs")
         return looks_of_npcs(self._table, 0)
 
     def cast(self) -> list[Face]:
         """The NPCs of this episode that the agent can see, each with a label and a picture of its face."""
+        self._table.look("cast")
         return cast_of(self._table, 0)
 
     def close(self) -> None:
-        """Nothing is held open but memory."""
+        """Nothing is held open but memory: the environment can be closed again, and used on."""

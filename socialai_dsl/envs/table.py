@@ -20,8 +20,9 @@ from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.describe import describe, history
 from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.envs.merge import CommonSpace
+from socialai_dsl.envs.options import each, reset_options
 from socialai_dsl.envs.starts import Starts
-from socialai_dsl.envs.values import word
+from socialai_dsl.envs.values import whole_number, word
 from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 
@@ -52,16 +53,6 @@ def joined(image: NDArray[np.uint32], extra: NDArray[np.uint16], channels: int) 
 
 
 LAST_EPISODE = (1 << 32) - 1
-OPTIONS = ("index", "layout", "reset_mask", "test_episode")
-
-
-def check_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The options of a reset. Raises ValueError for one that does not exist."""
-    options = dict(options or {})
-    for name in options:
-        if name not in OPTIONS:
-            raise ValueError(f"options: got {name!r}; expected some of {', '.join(OPTIONS)}")
-    return options
 
 
 def choose_episodes(
@@ -70,37 +61,49 @@ def choose_episodes(
     """Set seed, index and episode in the rows, uint64 (E, Key.WORDS), that are chosen, bool (E,).
 
     `test_episode` names episodes of a domain of keys that no seed reaches; 0 to 499 are the fixed test set.
-    One seed gives environment i (seed, i); a list gives it (seeds[i], 0); both start at episode 0. Without a seed the
-    next episode follows, or, in a fresh batch, a seed is drawn from the operating system.
+    One seed gives environment i (seed, i); a list gives it (seeds[i], 0); both start at episode 0. Without a seed, or
+    where the list has None, the next episode follows, or, in a fresh batch, a seed is drawn from the operating system.
+
+    Raises:
+        ValueError: an option is not what was expected, or says nothing beside another.
     """
     rows = np.flatnonzero(chosen)
-    if options.get("test_episode") is not None:
-        episodes = _each("options['test_episode']", options["test_episode"], len(keys), LAST_EPISODE)
+    test, index = options.get("test_episode"), options.get("index")
+    if test is not None:
+        for name, given in (("seed", seed), ("options['index']", index)):
+            if given is not None:
+                raise ValueError(
+                    f"{name}: got {given!r} beside options['test_episode'], which names an episode by itself; "
+                    "expected one of the two"
+                )
+        episodes = each("options['test_episode']", test, len(keys), LAST_EPISODE)
         keys[rows, Key.SEED], keys[rows, Key.INDEX] = TEST_DOMAIN, 0
-        keys[rows, Key.EPISODE] = episodes[rows]
+        keys[rows, Key.EPISODE] = np.array(episodes, np.uint64)[rows]
         return
-    if seed is None and not fresh:
-        keys[rows, Key.EPISODE] += np.uint64(1)
-        return
-    keys[rows, Key.EPISODE] = 0
-    if seed is None:
+    if index is not None and (seed is None or (_is_list(seed) and None in list(seed))):
+        raise ValueError(
+            f"options['index']: got {index!r} without a seed; expected a seed of which it is the index"
+        )
+    if seed is None and fresh:
         seed = secrets.randbelow(MAX_SEED + 1)
-    keys[rows, Key.SEED] = _each("seed", seed, len(keys), MAX_SEED)[rows]
-    one_for_all = isinstance(seed, int | np.integer)
-    keys[rows, Key.INDEX] = rows if one_for_all else 0
-    if options.get("index") is not None:
-        keys[rows, Key.INDEX] = _each("options['index']", options["index"], len(keys), MAX_SEED)[rows]
+    given_seeds = [None] * len(keys) if seed is None else seed
+    seeds = each("seed", given_seeds, len(keys), MAX_SEED, or_none=True)
+    if fresh:
+        seeds = [secrets.randbelow(MAX_SEED + 1) if number is None else number for number in seeds]
+    has_seed = np.array([number is not None for number in seeds])
+    keys[chosen & ~has_seed, Key.EPISODE] += np.uint64(1)
+    begun = np.flatnonzero(chosen & has_seed)
+    keys[begun, Key.EPISODE] = 0
+    keys[begun, Key.SEED] = np.array([number or 0 for number in seeds], np.uint64)[begun]
+    keys[begun, Key.INDEX] = 0 if _is_list(seed) else begun
+    if index is not None:
+        indices = each("options['index']", index, len(keys), MAX_SEED)
+        keys[begun, Key.INDEX] = np.array(indices, np.uint64)[begun]
 
 
-def _each(what: str, given: Any, count: int, highest: int) -> NDArray[np.uint64]:
-    """One number for each environment, from one for all or a list."""
-    numbers = [given] * count if isinstance(given, int | np.integer) else given
-    if not isinstance(numbers, Sequence | np.ndarray) or len(numbers) != count:
-        raise ValueError(f"{what}: got {given!r}; expected a whole number or a list of {count}")
-    for number in numbers:
-        if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number <= highest:
-            raise ValueError(f"{what}: got {number!r}; expected a whole number from 0 to {highest}")
-    return np.array([int(number) for number in numbers], np.uint64)
+def _is_list(seed: Any) -> bool:
+    """Whether each environment gets a seed of its own."""
+    return seed is not None and not isinstance(seed, int | np.integer)
 
 
 # -- the batch -----------------------------------------------------------------------------------------------
@@ -116,6 +119,11 @@ def _numbers_of_texts(lines: Sequence[str]) -> NDArray[np.uint64]:
     """A number for the text of each line, uint64 (lines,): several lines may say the same."""
     first = {text: number for number, text in reversed(list(enumerate(lines)))}
     return np.array([first[text] for text in lines], np.uint64)
+
+
+def too_early(call: str) -> ValueError:
+    """What is raised where a call needs an episode."""
+    return ValueError(f"{call}: got a call before the first reset(); expected reset() first")
 
 
 class Start(NamedTuple):
@@ -138,7 +146,8 @@ class Table(Copied):
         self.merged = CommonSpace.of(different)
         self.programs = self.merged.programs
         number = {id(playable): i for i, playable in enumerate(different)}
-        self.pool_of = np.array([number[id(playables[row % len(playables)])] for row in range(rows)])
+        numbers = np.array([number[id(playable)] for playable in playables])
+        self.pool_of = numbers[np.arange(rows) % len(numbers)]
         self._plays_acts = [isinstance(p, ProgramSuite) and p.in_sequence for p in different]
         self.batch = Batch(
             self.merged.parts,
@@ -179,7 +188,7 @@ class Table(Copied):
 
     def reset(self, seed: Any, options: Mapping[str, Any] | None) -> None:
         """Start episodes; see `choose_episodes` for the meaning of seeds, `layout.pins_of` for layouts."""
-        given = check_options(options)
+        given = reset_options(options)
         chosen = self._mask(given.get("reset_mask"))
         keys = self.state.keys.copy()
         choose_episodes(keys, chosen, seed, given, self.fresh)
@@ -195,17 +204,18 @@ class Table(Copied):
         for row in np.flatnonzero(chosen & (rows != 0)).tolist():
             own = layout if isinstance(layout, Mapping) else layout[row]
             # Whether the layout is of an act after one that was no success.
-            self.state.keys[row, Key.SPOILED] = self._plays_acts[self.pool_of[row]] and bool(
-                own.get("spoiled")
-            )
+            self.state.keys[row, Key.SPOILED] = bool(own.get("spoiled"))
         if self._starts:
             self._begin(chosen & (rows == 0))
 
     def step(self, task: Task, actions: Any) -> int:
         """Step all rows, int64 (E, 3 + slots); how many episodes ended. Raises ValueError for a bad action."""
         if self.fresh:
-            raise ValueError("step: got a call before the first reset(); expected reset() first")
-        given = np.asarray(actions)
+            raise too_early("step")
+        try:
+            given = np.asarray(actions)
+        except ValueError:  # rows of different lengths
+            given = np.array(None)
         expected = self.batch.ports.actions.shape
         if given.shape != expected or given.dtype.kind not in "iu":
             raise ValueError(
@@ -248,6 +258,11 @@ class Table(Copied):
         given = np.asarray(mask)
         if given.shape != (self.rows,) or given.dtype != np.bool_:
             raise ValueError(f"options['reset_mask']: got {mask!r}; expected {self.rows} booleans")
+        if self.fresh and not given.all():
+            raise ValueError(
+                f"options['reset_mask']: got {mask!r} in the first reset; expected all to be True, since no "
+                "environment has an episode yet"
+            )
         return given
 
     def _pins(
@@ -275,12 +290,18 @@ class Table(Copied):
                 known[key] = len(pins)
                 row = np.full(width, PIN_NONE, np.int16)
                 program = self.programs[self.merged.pools[pool][place]]
-                given = pins_of(program, layouts[i], in_suite=self._called[pool] is not None)
+                given = pins_of(program, layouts[i], self._other_keys(pool))
                 row[: len(given)] = given
                 row[-1] = place
                 pins.append(row)
             rows[i] = known[key]
         return np.stack(pins), rows
+
+    def _other_keys(self, pool: int) -> tuple[str, ...]:
+        """Keys of a layout that say something of a suite."""
+        if self._called[pool] is None:
+            return ()
+        return ("member", "spoiled") if self._plays_acts[pool] else ("member",)
 
     def _place_in_pool(self, layout: Any, pool: int, key: NDArray[np.uint64]) -> int:
         """Which program of its pool a row with a layout will play: the one that is named, else the one it draws."""
@@ -307,7 +328,12 @@ class Table(Copied):
             raise ValueError(
                 "set_member_weights: got weights, but these environments play no suite that draws members"
             )
-        self.batch.set_weights(0, weights)
+        if not isinstance(weights, Sequence | np.ndarray):
+            raise ValueError(f"weights: got {weights!r}; expected a list of whole numbers")
+        highest = (1 << 32) - 1
+        self.batch.set_weights(
+            0, [whole_number(f"weights[{i}]", n, 0, highest) for i, n in enumerate(weights)]
+        )
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """The actions of the agents' scripts, int64 (E, 3 + slots); nothing changes."""
@@ -317,10 +343,16 @@ class Table(Copied):
             raise ValueError(
                 f"the agent of {names} follows no frame; play the variant +oracle, if there is one"
             )
+        self.look("the script")
         self.batch.script()
         return self.batch.ports.actions.copy()
 
     # --- looking ---
+
+    def look(self, what: str) -> None:
+        """Raise ValueError if there is nothing to be seen yet."""
+        if self.fresh:
+            raise too_early(what)
 
     def start(self, row: int) -> Start:
         """The moment at which a row is, copied."""
@@ -366,6 +398,8 @@ class Table(Copied):
 
     def describe(self, row: int) -> dict[str, Any]:
         """The state of a row in the scenario's own names; a superset of a layout."""
+        self.look("describe")
+        row = whole_number("index", row, 0, self.rows - 1)
         member = self.member(row)
         described = describe(self.program(row), self.state.registers[row])
         if member is None:
@@ -440,6 +474,7 @@ class Table(Copied):
 
     def snapshot(self) -> bytes:
         """The exact state of all rows, randomness included."""
+        self.look("snapshot")
         return snapshot.pack(self._arrays(), self._identity())
 
     def restore(self, data: bytes) -> None:

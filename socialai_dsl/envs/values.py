@@ -185,14 +185,14 @@ def utterance_number(program: Program, given: Any, key: str) -> int:
 def whole_number(key: str, value: Any, low: int, high: int, hint: str = "") -> int:
     """A whole number in a range. Raises ValueError that names the key for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise ValueError(f"{key}: got {value!r}; expected a number from {low} to {high}{hint}")
+        raise ValueError(f"{key}: got {value!r}; expected a whole number from {low} to {high}{hint}")
     return int(value)
 
 
 def word(key: str, value: Any, words: Sequence[Any]) -> int:
     """The index of a word. Raises ValueError that names the key and what is possible for any other."""
     for i, known in enumerate(words):
-        if value == known and isinstance(value, type(known)):
+        if isinstance(value, type(known)) and value == known:
             return i
     if len(words) > 12:
         raise ValueError(f"{key}: got {value!r}{meant(str(value), map(str, words))[:200]}")

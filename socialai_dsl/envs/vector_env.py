@@ -10,8 +10,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.copying import Copied
+from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table, joined
 from socialai_dsl.program import Program
@@ -80,11 +82,15 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             )
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else str(autoreset_mode)
         if mode.lower() not in _MODES:
+            near = suggested(mode, [known.value for known in AutoresetMode], quoted=repr)
             raise ValueError(
-                f"autoreset_mode: got {autoreset_mode!r}; expected NextStep, SameStep or Disabled"
+                f"autoreset_mode: got {autoreset_mode!r}; expected NextStep, SameStep or Disabled{near}"
             )
-        if render_mode not in (None, "rgb_array", "ansi"):
-            raise ValueError(f"render_mode: got {render_mode!r}; expected None, 'rgb_array' or 'ansi'")
+        if not isinstance(copy, bool):
+            raise ValueError(f"copy: got {copy!r}; expected True or False")
+        for playable in playables:
+            if not isinstance(playable, Playable):
+                raise ValueError(f"playables: got {playable!r}; expected what `compile` returns")
         self.autoreset_mode = _MODES[mode.lower()]
         self.metadata = {
             "render_modes": ["rgb_array", "ansi"],
@@ -95,7 +101,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         self._table = Table(playables, int(num_envs))
         self._copy = copy
         self.num_envs = int(num_envs)
-        self.render_mode = render_mode
+        self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
         self.single_observation_space = self._table.merged.observation_space()
         self.single_action_space = self._table.merged.action_space()
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -128,28 +134,28 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
 
         Options:
 
-        * `reset_mask`, bool (E,): the environments that restart; without it, all of them.
-        * `test_episode`, an int or a list of E: plays these episodes of a domain that no seed reaches; 0 to 499 are the
-          fixed test set.
+        * `reset_mask`, bool (E,): the environments that restart; without it, and in the first reset, all of them.
+        * `test_episode`, an int or a list of E, without a seed: plays these episodes of a domain that no seed reaches;
+          0 to 499 are the fixed test set.
         * `layout`, a mapping or a list of E with None for a drawn room: starts from a known room.
-        * `index`, an int or a list of E: plays as environment `index` of a batch with this seed.
+        * `index`, an int or a list of E, with a seed: plays as environment `index` of a batch with this seed.
 
         Args:
             seed: one number s gives environment i the stream (s, i); a list of E gives it (seeds[i], 0). Both begin
-                with episode 0. Without a seed every environment plays its next episode; the first reset then draws a
-                seed from the operating system.
+                with episode 0. Without a seed every environment plays its next episode, as do those for which the list
+                has None; the first reset then draws seeds from the operating system.
             options: any of those above.
 
         Returns:
             The observation and empty infos.
 
         Raises:
-            ValueError: a seed, an option or a layout is not what was expected.
+            ValueError: a seed, an option or a layout is not what was expected, or says nothing beside another.
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
-        if seed is not None:
-            self._np_random_seed = seed if isinstance(seed, int) else -1
         self._table.reset(seed, options)
+        if isinstance(seed, int | np.integer):
+            super().reset(seed=int(seed))
         return self._observation(), {}
 
     def step(
@@ -291,9 +297,14 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         self._table.restore(data)
 
     def render(self) -> tuple[Any, ...] | None:
-        """One picture for each environment: uint8 (H, W, 3) or text, by `render_mode`; None without one."""
+        """One picture for each environment: uint8 (H, W, 3) or text, by `render_mode`; None without one.
+
+        Raises:
+            ValueError: there was no reset yet.
+        """
         if self.render_mode is None:
             return None
+        self._table.look("render")
         return tuple(frame(self._table, row, self.render_mode) for row in range(self.num_envs))
 
     def set_attr(self, name: str, values: Mapping[str, Any] | Any) -> None:

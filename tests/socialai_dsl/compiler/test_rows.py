@@ -103,7 +103,7 @@ def test_layouts_give_them_back(tmp_path: Path) -> None:
         ({"let": {"ann.name_of": "dax"}}, "expected a mapping of balls"),
         ({"let": {"ann.name_of": {"balls[16]": "dax"}}}, "there is no 'balls\\[16\\]'"),
         ({"let": {"ann.name_of": {"balls[1]": "fep"}}}, "expected one of none, dax, wug"),
-        ({"let": {"ann.gap": {"blue": 10}}}, "expected a number from 0 to 9"),
+        ({"let": {"ann.gap": {"blue": 10}}}, "expected a whole number from 0 to 9"),
     ],
 )
 def test_layouts_that_do_not_fit(tmp_path: Path, given: dict[str, Any], message: str) -> None:

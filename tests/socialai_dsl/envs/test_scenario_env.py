@@ -137,7 +137,7 @@ def test_a_layout_is_what_the_room_becomes_and_the_rest_is_drawn_around_it() -> 
     ("layout", "message"),
     [
         ({"wizzard": {}}, "no 'wizzard'; did you mean 'wizard'"),
-        ({"room": {"width": 9, "height": 6}}, "room.width: got 9; expected a number from 5 to 8"),
+        ({"room": {"width": 9, "height": 6}}, "room.width: got 9; expected a whole number from 5 to 8"),
         ({"agent": {"at": [7, 7]}}, "agent.at\\[0\\]: got 7; .*give `room`"),
         ({"room": {"width": 6, "height": 6}, "agent": {"at": [9, 1]}}, "agent.at\\[0\\]: got 9"),
         ({"agent": {"at": [2]}}, "expected \\[x, y\\]"),
@@ -154,7 +154,7 @@ def test_a_layout_is_what_the_room_becomes_and_the_rest_is_drawn_around_it() -> 
         ({"honest": {"name": "Jim"}}, "honest.name: got 'Jim'"),
         ({"wizard": {"name": "Merlin"}}, "does not draw it"),
         ({"wizard": {"state": "asleep"}}, "wizard.state: got 'asleep'"),
-        ({"t": 100}, "t: got 100; expected a number from 0 to 99"),
+        ({"t": 100}, "t: got 100; expected a whole number from 0 to 99"),
         ({"heard": ["Gandalf: Hello"]}, "heard\\[0\\]: got 'Gandalf: Hello'"),
         ({"agent": 3}, "agent: got 3; expected a mapping"),
         ([1, 2], "expected a mapping"),

@@ -204,7 +204,10 @@ def test_a_mixed_batch_plays_each_program_as_it_would_alone() -> None:
         (lambda: sd.make_vec([], 2), "scenarios: got none"),
         (lambda: sd.make_vec("talkitout", 2).reset(seed=-1), "seed: got -1"),
         (lambda: sd.make_vec("talkitout", 2).reset(seed=[1]), "seed: got \\[1\\]"),
-        (lambda: sd.make_vec("talkitout", 2).reset(options={"layouts": {}}), "got 'layouts'"),
+        (
+            lambda: sd.make_vec("talkitout", 2).reset(options={"layouts": {}}),
+            "layouts: got {}, but reset has no such option; did you mean 'layout'",
+        ),
         (lambda: sd.make_vec("talkitout", 2).step(np.zeros((2, 4), int)), "before the first reset"),
         (lambda: stepped(np.zeros((2, 3), int)), "shape \\(2, 3\\)"),
         (lambda: stepped(np.zeros((2, 4))), "float64"),

@@ -1,0 +1,70 @@
+"""Options of callers: each is used, or refused by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from socialai_dsl.diagnostics import suggested
+
+
+def refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str], otherwise: str = "") -> None:
+    """Raise ValueError for the first option that a call does not have, if there is one.
+
+    Args:
+        call: what was called.
+        unknown: options that it does not have, with their values.
+        known: those that it has.
+        otherwise: what is added where none of them is near.
+    """
+    for name, given in unknown.items():
+        hint = suggested(str(name), known, f"; expected some of {', '.join(known)}{otherwise}", repr)
+        raise ValueError(f"{name}: got {given!r}, but {call} has no such option{hint}")
+
+
+def check_render_mode(given: Any, modes: Sequence[str]) -> str | None:
+    """One of the modes, or None. Raises ValueError for anything else."""
+    if given is None or (isinstance(given, str) and given in modes):
+        return given
+    near = suggested(str(given), modes, quoted=repr)
+    raise ValueError(f"render_mode: got {given!r}; expected None or one of {', '.join(modes)}{near}")
+
+
+def reset_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The options of a reset. Raises ValueError for one that does not exist."""
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise ValueError(f"options: got {options!r}; expected a mapping of names to values, or None")
+    known = ("index", "layout", "reset_mask", "test_episode")
+    refuse_unknown("reset", {k: v for k, v in options.items() if k not in known}, known)
+    return dict(options)
+
+
+def each(what: str, given: Any, count: int, highest: int, or_none: bool = False) -> list[int | None]:
+    """One number for each environment, from one for all or a list.
+
+    Args:
+        what: name of the option.
+        given: its value.
+        count: how many environments there are.
+        highest: greatest number; the least is 0.
+        or_none: whether elements of the list may be None.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    numbers = [given] * count if isinstance(given, int | np.integer) else given
+    is_list = (isinstance(numbers, Sequence) and not isinstance(numbers, str | bytes)) or (
+        isinstance(numbers, np.ndarray) and numbers.ndim == 1
+    )
+    if not is_list or len(numbers) != count:
+        raise ValueError(f"{what}: got {given!r}; expected a whole number or a list of {count}")
+    for number in numbers:
+        if number is None and or_none:
+            continue
+        if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number <= highest:
+            raise ValueError(f"{what}: got {number!r}; expected a whole number from 0 to {highest}")
+    return [None if number is None else int(number) for number in numbers]
