@@ -328,12 +328,12 @@ class Table(Copied):
             raise ValueError(
                 "set_member_weights: got weights, but these environments play no suite that draws members"
             )
-        if not isinstance(weights, Sequence | np.ndarray):
-            raise ValueError(f"weights: got {weights!r}; expected a list of whole numbers")
-        highest = (1 << 32) - 1
-        self.batch.set_weights(
-            0, [whole_number(f"weights[{i}]", n, 0, highest) for i, n in enumerate(weights)]
+        whole = isinstance(weights, Sequence | np.ndarray) and all(
+            isinstance(weight, int | np.integer) and not isinstance(weight, bool) for weight in weights
         )
+        if not whole:
+            raise ValueError(f"weights: got {weights!r}; expected a list of whole numbers")
+        self.batch.set_weights(0, weights)
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """The actions of the agents' scripts, int64 (E, 3 + slots); nothing changes."""
