@@ -28,8 +28,9 @@ SECRET = "sk-very-secret"
 
 @pytest.fixture(autouse=True)
 def surroundings(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A key in the environment, and no time to wait for."""
+    """A key in the environment, no time to wait for, and no word about progress, however slow the machine is."""
     monkeypatch.setenv("OPENAI_API_KEY", SECRET)
+    monkeypatch.setattr("socialai_dsl.evaluation.language_model._SECONDS_BETWEEN_LINES", 1e9)
     monkeypatch.setattr("socialai_dsl.llm.endpoint._FIRST_WAIT", 0.001)
 
 
