@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+MOST_EPISODES: Final = 1_000_000
+"""The most test episodes of an evaluation: more than anybody waits for, few enough that their results fit in memory."""
 
 
 @dataclass(frozen=True)

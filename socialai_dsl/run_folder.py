@@ -9,7 +9,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
-from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from socialai_dsl.atomic import write_json as write_json
@@ -17,12 +16,14 @@ from socialai_dsl.atomic import write_text as write_text
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.folder import EPISODES as EPISODES
 from socialai_dsl.experiments.folder import REPLAY as REPLAY
+from socialai_dsl.folder_lock import HeldError, hold
 from trainer.config import RunConfig
 
 RESULT: Final = "result.json"
 SETTINGS: Final = "config.json"
-LOCK: Final = "run.lock"
-_SECONDS_TO_WAIT: Final = 10.0
+_WRITER: Final = "run"
+LOCK_FILES: Final = (f"{_WRITER}.lock", f"{_WRITER}.owner")
+_SECONDS_TO_WAIT: Final = 5.0
 """A process whose parent was killed takes a moment to end."""
 _REPORTED_PACKAGES: Final = ("socialai-dsl", "numpy", "numba", "gymnasium", "torch")
 
@@ -35,20 +36,25 @@ def scenario_folder_name(spec: str) -> str:
     return name + plus + variants + ("," if mark else "") + parameters.replace("&", ",").replace("/", "_")
 
 
-def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:
-    """Make the folder of a new run: `out`, or `runs/<scenario>/<time>-s<seed>`.
+@contextlib.contextmanager
+def new_run_folder(out: Path | None, spec: str, seed: int) -> Iterator[Path]:
+    """Make the folder of a new run, `out` or `runs/<scenario>/<time>-s<seed>`, and be its only writer.
 
     Raises:
-        UsageError: `out` holds a run already.
+        UsageError: `out` holds a run already, or another process writes there.
         OSError: it cannot be made.
     """
-    if out is not None:
-        if (out / SETTINGS).exists():
+    folder = _fresh_folder(spec, seed) if out is None else out
+    with only_writer(folder):
+        if (folder / SETTINGS).exists():
             raise UsageError(
                 f"--out: {out} holds a run already; go on with --resume, or choose another folder"
             )
-        out.mkdir(parents=True, exist_ok=True)
-        return out
+        yield folder
+
+
+def _fresh_folder(spec: str, seed: int) -> Path:
+    """Make a folder that no other run has."""
     parent = Path("runs") / scenario_folder_name(spec)
     stamp = f"{time.strftime('%Y%m%d-%H%M%S')}-s{seed}"
     for attempt in range(100):
@@ -63,20 +69,21 @@ def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:
 
 @contextlib.contextmanager
 def only_writer(folder: Path) -> Iterator[None]:
-    """Be the one process that writes a run's folder; the system ends this when the process dies, however it dies.
+    """Be the one process that writes a folder, which is made; the system ends this when the process dies.
+
+    Whoever looks at what the folder holds, to decide what to write, does so inside.
 
     Raises:
-        UsageError: another process writes there.
+        UsageError: another process writes there; the message names it.
+        OSError: the folder cannot be made or written.
     """
-    lock = FileLock(folder / LOCK, timeout=_SECONDS_TO_WAIT)
-    try:
-        lock.acquire()
-    except Timeout:
-        raise UsageError(f"{folder}: another process is at work on this run") from None
-    try:
+    folder.mkdir(parents=True, exist_ok=True)
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(hold(folder, _WRITER, _SECONDS_TO_WAIT))
+        except HeldError as error:
+            raise UsageError(f"{error}; wait until it ends, or choose another folder") from None
         yield
-    finally:
-        lock.release()
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -107,7 +114,7 @@ def versions() -> dict[str, str]:
 
 
 def read_config(folder: Path) -> RunConfig:
-    """The configuration of a run's folder.
+    """The configuration of a run's folder, as of a run in this folder.
 
     Raises:
         UsageError: it is not a run's folder, or its configuration is damaged.
@@ -116,7 +123,7 @@ def read_config(folder: Path) -> RunConfig:
         raise UsageError(f"{folder} is not a run's folder, it has no {SETTINGS}")
     try:
         # As JSON, because strict validation takes no lists for tuples from Python.
-        return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS)))
+        return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS))).within(folder)
     except ValidationError as error:
         place, said = first_mistake(error.errors())
         raise UsageError(f"{folder / SETTINGS}: {place}: {said}") from None

@@ -36,7 +36,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "atomic": (set(), set()),
     "baselines": (set(), set()),
     "errors": (set(), set()),
-    "run_folder": ({"atomic", "errors", "experiments"}, {"filelock", "pydantic", CONFIG}),
+    "folder_lock": (set(), {"filelock"}),
+    "run_folder": ({"atomic", "errors", "experiments", "folder_lock"}, {"pydantic", CONFIG}),
     "source": (set(), set()),
     "diagnostics": ({"source"}, set()),
     "draws": (set(), {"numpy", "numba"}),
@@ -87,12 +88,12 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
     "llm": (
-        TEXT_SIDE | {"program", "program_suite", "envs", "render"},
+        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "render"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
     "experiments": (
-        TEXT_SIDE | {"atomic", "compilation"},
-        {"filelock", "ray", "submitit", "yaml", CONFIG, SHIPPED},
+        TEXT_SIDE | {"atomic", "compilation", "folder_lock"},
+        {"ray", "submitit", "yaml", CONFIG, SHIPPED},
     ),
     "reporting": (
         {"errors", "experiments", "baselines"},

@@ -80,17 +80,22 @@ class Checkpoint:
 
 
 def write(directory: Path, checkpoint: Checkpoint, keep: int = 2) -> Path:
-    """Write `directory/<frames>.safetensors`, keep the `keep` newest, and sweep leftovers of writes that were killed.
+    """Write `directory/<frames>.safetensors`, and sweep leftovers of writes that were killed.
 
-    The file appears under its name only when all of it is on the disk.
+    Kept are this checkpoint, the `keep - 1` before it, and any with more frames: a damaged one from before, say, which
+    the run writes again when it gets there. The file appears under its name only when all of it is on the disk.
 
     Raises:
         OSError: it cannot be written, for example because the disk is full; earlier checkpoints are untouched.
+        ValueError: `keep` is less than 1.
     """
+    if keep < 1:
+        raise ValueError(f"keep: got {keep}, expected at least 1")
     directory.mkdir(parents=True, exist_ok=True)
     path = directory / f"{checkpoint.meta.frames:015d}.safetensors"
     write_file(path, checkpoint)
-    for old in [*sorted(directory.glob("*.safetensors"))[:-keep], *directory.glob("*.tmp")]:
+    written = [file for file in sorted(directory.glob("*.safetensors")) if file <= path]
+    for old in [*written[:-keep], *directory.glob("*.tmp")]:
         old.unlink(missing_ok=True)
     return path
 

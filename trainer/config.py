@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
 Role = Literal["flag", "hyper", "kept"]
 """Where an option is given: by a flag of its own, by `--hyper NAME=VALUE`, or nowhere (it follows from others)."""
@@ -35,6 +35,11 @@ _flag = partial(_option, role="flag")
 Name = Annotated[str, Field(min_length=1)]
 
 
+MOST_FRAMES: Final = 10**15 - 1
+"""Names of checkpoints have fifteen digits."""
+_MOST_IN_UPDATE: Final = 2**24
+
+
 class RunConfig(BaseModel):
     """Every option of a run, resolved: there is no `auto`. Equal configurations and code compute equal runs.
 
@@ -47,6 +52,11 @@ class RunConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
+    _place: Path = PrivateAttr(default_factory=Path)
+    """The run's folder, from which what it keeps is named; it is not part of the configuration, so it may move."""
+    _code: Path | None = PrivateAttr(None)
+    """Where code of one's own is loaded from, if not from the run's folder."""
+
     scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
     agent: Name = _flag(
         "ppo",
@@ -54,10 +64,10 @@ class RunConfig(BaseModel):
         "checkpoint or run folder; only ppo is trained",
     )
     frames: int = _flag(
-        600_000, "frames to train for: steps of all environments together", result=False, ge=0
+        600_000, "frames to train for: steps of all environments together", result=False, ge=0, le=MOST_FRAMES
     )
     seed: int = _flag(0, "seeds weights, sampling, shuffling and episodes", ge=0, lt=2**63)
-    envs: int = _flag(256, "environments stepped together (measured)", ge=1)
+    envs: int = _flag(256, "environments stepped together (measured)", ge=1, le=65_536)
     net: Name = _flag(
         "fast",
         "fast, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the paper's network, update "
@@ -82,14 +92,14 @@ class RunConfig(BaseModel):
     guide_share: float = _option(0.5, "first share of the frames, led by the guide (measured)", ge=0, le=1)
     imitation_coef: float = _option(1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0)
 
-    horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
+    horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1, le=65_536)
     bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
     update: Literal["environments", "chunks"] = _option(
         "environments",
         "what a minibatch is made of. environments: whole environments, each distinct frame computed once; chunks: "
         "stretches of `bptt` steps, one step of all of them at a time (paper)",
     )
-    epochs: int = _option(4, "passes over each rollout (paper)", ge=1)
+    epochs: int = _option(4, "passes over each rollout (paper)", ge=1, le=1_000)
     minibatches: int = _option(4, "parts a rollout is cut into (measured)", ge=1)
     lr: float = _option(7e-4, "Adam's learning rate at the start (measured; paper 1e-4)", gt=0)
     lr_end: float | None = _option(None, "learning rate at the end, reached linearly; null: unchanged", gt=0)
@@ -132,9 +142,9 @@ class RunConfig(BaseModel):
     threads: int = _flag(
         1, "CPU threads of each minibatch; runs equal to the bit need equally many", ge=1, le=64
     )
-    checkpoint_every: int = _flag(50, "updates between checkpoints", result=False, ge=1)
-    keep_checkpoints: int = _flag(2, "checkpoints kept, the newest ones", result=False, ge=1)
-    eval_episodes: int = _flag(500, "episodes of the test set", ge=1)
+    checkpoint_every: int = _flag(50, "updates between checkpoints", result=False, ge=1, le=MOST_FRAMES)
+    keep_checkpoints: int = _flag(2, "checkpoints kept, the newest ones", result=False, ge=1, le=MOST_FRAMES)
+    eval_episodes: int = _flag(500, "episodes of the test set", ge=1, le=1_000_000)
     tensorboard: bool = _option(True, "also write TensorBoard events", result=False)
     wandb: Name | None = _flag(
         None,
@@ -144,6 +154,13 @@ class RunConfig(BaseModel):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.trains and self.frames == 0:
+            raise ValueError("frames: got 0, expected at least 1, because this agent is trained")
+        if self.frames_per_update > _MOST_IN_UPDATE:
+            raise ValueError(
+                f"envs: got {self.envs} times a horizon of {self.horizon}, expected a product of at most "
+                f"{_MOST_IN_UPDATE}, because an update holds all these frames in memory"
+            )
         if self.minibatches > self.envs:
             raise ValueError(
                 f"minibatches: got {self.minibatches}, expected at most envs = {self.envs}, because a minibatch "
@@ -187,11 +204,29 @@ class RunConfig(BaseModel):
         fixed = [name for name in type(self).model_fields if name not in free]
         return [name for name in fixed if getattr(self, name) != getattr(other, name)]
 
+    def within(self, folder: Path, code: Path | None = None) -> Self:
+        """The same configuration of a run in this folder, wherever that is now.
+
+        Args:
+            folder: the run's.
+            code: where code of one's own is loaded from, if not from there.
+        """
+        copy = self.model_copy()
+        copy._place, copy._code = folder, code
+        return copy
+
+    @property
+    def played(self) -> str:
+        """The scenario as it is loaded from here: the copy in the run's folder, if it keeps one."""
+        return scenario_in(self._place, self.scenario)
+
     @property
     def code_folder(self) -> Path:
-        """Where `mine:Net` is looked for first: the folder of the scenario's file; the present one for a name."""
-        file = Path(self.scenario.partition("?")[0].partition("+")[0])
-        return file.parent if file.suffix in (".yaml", ".yml") else Path()
+        """Where `mine:Net` is looked for first: the folder of the scenario's file; for a name the run's folder."""
+        if self._code is not None:
+            return self._code
+        file = scenario_file(self.played)
+        return file.parent if file.suffix in (".yaml", ".yml") else self._place
 
     @property
     def own_files(self) -> dict[str, Path]:
@@ -199,6 +234,22 @@ class RunConfig(BaseModel):
         named = {option: getattr(self, option) for option in ("net", "bonus", "curriculum", "guide")}
         files = {option: code_file(name, self.code_folder) for option, name in named.items() if ":" in name}
         return {option: file for option, file in files.items() if file.is_file()}
+
+
+SCENARIO_FOLDER: Final = "scenario"
+"""Where a folder keeps the files of the scenario that it is about."""
+
+
+def scenario_file(spec: str) -> Path:
+    """`a/b.yaml+variant?x=1` -> `a/b.yaml`."""
+    return Path(spec.partition("?")[0].partition("+")[0])
+
+
+def scenario_in(folder: Path, spec: str) -> str:
+    """A scenario that a file in the folder names, as it is loaded from here: the copy in there, if there is one."""
+    file = scenario_file(spec)
+    kept = file.parts[:1] == (SCENARIO_FOLDER,) and (folder / file).is_file()
+    return f"{folder.as_posix()}/{spec}" if kept else spec
 
 
 def code_file(name: str, folder: Path) -> Path:

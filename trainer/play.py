@@ -16,10 +16,12 @@ from socialai_dsl.evaluation.episodes import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta
+from trainer.config import scenario_in
 from trainer.errors import CheckpointError
 from trainer.features import Actor, Int64
 from trainer.nets import ActorCritic, NetSpec
 from trainer.nets.memory import emptied
+from trainer.shipped import located
 
 # Encodings kept before they are made anew, so that endless play does not fill the memory.
 _REMEMBERED_FRAMES = 1 << 16
@@ -73,7 +75,7 @@ class CheckpointPolicy:
         """
         checkpoint = checkpoints.read_agent(path)
         if envs is None:
-            scenario = checkpoint.meta.config.scenario
+            scenario = _scenario_of(located(path), checkpoint.meta.config.scenario)
             if not scenario:
                 raise CheckpointError(f"{path}: does not say which scenario it is for, expected envs")
             envs = socialai_dsl.make(scenario)
@@ -124,6 +126,18 @@ class CheckpointPolicy:
         """Begin with an empty memory if another number of environments is played now."""
         if len(self._memory) != count:
             self._memory, self._actor = self.net.memory.initial(count), None
+
+
+def _scenario_of(agent: Path, scenario: str) -> str:
+    """The scenario of an agent's training: the copy in its folder, in which its checkpoint may lie deeper."""
+    return next(
+        (
+            found
+            for one in (agent, *agent.absolute().parents[:2])
+            if (found := scenario_in(one, scenario)) != scenario
+        ),
+        scenario,
+    )
 
 
 class TransferWarning(UserWarning):

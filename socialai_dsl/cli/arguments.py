@@ -2,87 +2,172 @@
 
 import argparse
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from typing import Any, Final
+
+from socialai_dsl.baselines import MOST_EPISODES
+from socialai_dsl.errors import UsageError
 
 STYLE: Final[dict[str, Any]] = {
     "choices": ("prose", "grid", "json"),
-    "default": "prose",
     "help": "style of the observations (default: prose)",
 }
 """The option `--style`: how a language model reads observations."""
 ROOMS: Final = 100
 SECONDS: Final = 20.0
+_LONGEST: Final = 366 * 24 * 3600
+_MOST: Final = 10**9
+_MOST_AT_ONCE: Final = 1_000
+_MOST_ROOMS: Final = 100_000
+_SEEDS: Final = 2**63
+_SHOWN: Final = 40
+"""The most characters of a mistyped number that a message repeats."""
+_IDENTIFIER: Final = re.compile(r"\w[\w.-]{0,63}")
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:
-    """Declare how much is tried, and for how long."""
-    parser.add_argument(
-        "--rooms",
-        type=positive,
-        default=ROOMS,
-        metavar="N",
-        help=f"number of rooms (default: {ROOMS})",
-    )
+    """Declare how much is tried, and for how long; what is not given is None."""
+    parser.add_argument("--rooms", type=rooms, metavar="N", help=f"number of rooms (default: {ROOMS})")
     parser.add_argument(
         "--seconds",
-        type=at_least(0.0),
-        default=SECONDS,
+        type=time_limit,
         metavar="S",
         help=f"time limit: N scenarios have N times as much in all; 0 for none (default: {SECONDS:g})",
     )
 
 
+def limit(arguments: argparse.Namespace) -> float:
+    """Seconds for a scenario; 0 is no limit."""
+    return SECONDS if arguments.seconds is None else float(arguments.seconds)
+
+
+def refuse(arguments: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Refuse options that were given and would be ignored.
+
+    Args:
+        arguments: what was typed; an option that was not is None, False or an empty list.
+        names: of the options, as attributes.
+        why: why they do not apply.
+
+    Raises:
+        UsageError: one of them was given; the message names it.
+    """
+    for name in sorted(names):
+        value = getattr(arguments, name)
+        if value is not None and value is not False and value != []:
+            raise UsageError(f"--{name.replace('_', '-')}: {why}")
+
+
 def positive(text: str) -> int:
     """A whole number of at least 1; `1_000` and `1,000` are 1000."""
-    return _number(text, 1)
+    return _whole_number(text, 1, _MOST)
+
+
+def rooms(text: str) -> int:
+    """How many rooms are drawn."""
+    return _whole_number(text, 1, _MOST_ROOMS)
+
+
+def episodes(text: str) -> int:
+    """How many test episodes."""
+    return _whole_number(text, 1, MOST_EPISODES)
+
+
+def episode(text: str) -> int:
+    """The number of a test episode."""
+    return _whole_number(text, 0, MOST_EPISODES - 1)
+
+
+def at_once(text: str) -> int:
+    """How many of something at once."""
+    return _whole_number(text, 1, _MOST_AT_ONCE)
 
 
 def natural(text: str) -> int:
     """A whole number of at least 0."""
-    return _number(text, 0)
+    return _whole_number(text, 0, _MOST)
+
+
+def seed(text: str) -> int:
+    """The seed of rooms or draws."""
+    return _whole_number(text, 0, _SEEDS - 1)
+
+
+def port(text: str) -> int:
+    """A port; 0 is any that is free."""
+    return _whole_number(text, 0, 65_535)
+
+
+def time_limit(text: str) -> float:
+    """Seconds, with a fraction perhaps; 0 is no limit."""
+    return _number(text, 0, _LONGEST)
 
 
 def seconds(text: str) -> float:
     """A time above 0; it may have a fraction."""
-    found = _fraction(text)
-    if not (0 < found < math.inf):
-        raise argparse.ArgumentTypeError(f"expected a number of seconds above 0, got {text!r}")
+    try:
+        found = time_limit(text)
+    except argparse.ArgumentTypeError:
+        found = 0
+    if found == 0:
+        raise argparse.ArgumentTypeError(
+            f"expected a number of seconds above 0, at most {_LONGEST}, got {text[:_SHOWN]!r}"
+        )
     return found
 
 
 def percent(text: str) -> float:
     """A number from 0 to 100."""
-    found = _fraction(text)
-    if not (0 <= found <= 100):
-        raise argparse.ArgumentTypeError(f"got {text}, expected a per cent from 0 to 100")
+    try:
+        return _number(text, 0, 100)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a per cent from 0 to 100") from None
+
+
+def number_between(least: float, most: float) -> Callable[[str], float]:
+    """A number within bounds."""
+    return lambda text: _number(text, least, most)
+
+
+def identifier(text: str) -> str:
+    """A word that can be part of a file's name."""
+    if not _IDENTIFIER.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f"got {_short(text)}, expected letters, digits, `.`, `_` and `-`, at most 64"
+        )
+    return text
+
+
+def whole_number(text: str) -> int:
+    """A whole number whose bounds are somebody else's; `1_000` and `1,000` are 1000."""
+    try:
+        return int(text.replace("_", "").replace(",", ""))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a whole number") from None
+
+
+def _whole_number(text: str, least: int, most: int) -> int:
+    found = whole_number(text)
+    _require_within(text, found, least, most)
     return found
 
 
-def at_least(least: float) -> Callable[[str], float]:
-    """A finite number that is not below `least`."""
-
-    def number(text: str) -> float:
-        found = _fraction(text)
-        if not (least <= found < math.inf):
-            raise argparse.ArgumentTypeError(f"got {text}, expected at least {least:g}")
-        return found
-
-    return number
-
-
-def _fraction(text: str) -> float:
+def _number(text: str, least: float, most: float) -> float:
     try:
-        return float(text)
+        found = float(text)
     except ValueError:
-        return math.nan
+        found = math.nan
+    _require_within(text, found, least, most)
+    return found
 
 
-def _number(text: str, least: int) -> int:
-    try:
-        number = int(text.replace("_", "").replace(",", ""))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number") from None
-    if number < least:
-        raise argparse.ArgumentTypeError(f"got {number}, expected at least {least}")
-    return number
+def _require_within(text: str, found: float, least: float, most: float) -> None:
+    if not found >= least:  # so that what is not a number is refused as well
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected at least {least}")
+    if found > most:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected at most {most}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

@@ -4,7 +4,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.arguments import add_effort, natural, percent, positive
+from socialai_dsl.cli.arguments import ROOMS, add_effort, episodes, limit, percent, positive, refuse, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine, json_text
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
 STATES: Final = 50_000
+EPISODES: Final = 200
 PARTS: Final = ("claims", "coverage", "script")
 
 
@@ -42,11 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "that is possible without seeing or hearing an NPC",
     )
     add_effort(parser)
-    parser.add_argument("--seed", type=natural, default=0, metavar="N", help="seed of the rooms (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="N", help="seed of the rooms (default: 0)")
     parser.add_argument(
         "--states",
         type=positive,
-        default=STATES,
         metavar="N",
         help=f"for claims and script: give up on a room after N states (default: {STATES})",
     )
@@ -59,10 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--episodes",
-        type=positive,
-        default=200,
+        type=episodes,
         metavar="N",
-        help="for coverage: number of episodes of each agent (default: 200)",
+        help=f"for coverage: number of episodes of each agent (default: {EPISODES})",
     )
     parser.add_argument(
         "--fail-under",
@@ -86,12 +85,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.engine.jit import load
     from socialai_dsl.engine.kernel import serve
 
+    _refuse_what_does_not_apply(arguments)
     progress = ProgressLine(sys.stderr)
     parts = [part for part in PARTS if part in (arguments.parts or ["claims"])]
     scenarios = [pair for name in arguments.scenarios for pair in scenarios_of(name)]
     # Before the time begins: where the engine is not compiled yet, that takes longer than most checks.
     load(serve)
-    clock = Clock(arguments.seconds * len(scenarios) or None, progress.show)
+    clock = Clock(limit(arguments) * len(scenarios) or None, progress.show)
     documents: list[dict[str, Any]] = []
     ends = [Exit.GOOD]
     for left, part in zip(range(len(parts), 0, -1), parts, strict=True):
@@ -109,6 +109,24 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return max(ends)
 
 
+_OF_PART: Final = {
+    "claims": ("deep", "strict", "rooms", "states"),
+    "coverage": ("agent", "episodes", "fail_under"),
+    "script": ("rooms", "states"),
+}
+"""The options that a part of the check has a use for; those that are in none of these are everybody's."""
+
+
+def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
+    """Refuse, by name, what none of the parts that are asked for would use."""
+    parts = arguments.parts or ["claims"]
+    used = {name for part in parts for name in _OF_PART[part]}
+    idle = {name for names in _OF_PART.values() for name in names} - used
+    for name in idle:
+        fitting = " or ".join(f"--part {part}" for part, names in _OF_PART.items() if name in names)
+        refuse(arguments, [name], f"it is for {fitting}, got --part {' --part '.join(parts)}")
+
+
 def _claims(
     arguments: argparse.Namespace,
     scenarios: "list[tuple[LoadedScenario, str]]",
@@ -123,7 +141,7 @@ def _claims(
     end = Exit.GOOD
     for number, (scenario, called) in enumerate(scenarios):
         own = clock.part(len(scenarios) - number)
-        effort = Effort(arguments.rooms, arguments.seed, arguments.states, own)
+        effort = Effort(arguments.rooms or ROOMS, arguments.seed, arguments.states or STATES, own)
         report = check_scenario(scenario, called, effort, arguments.deep, say)
         documents.append(report.as_object())
         if report.fails(arguments.strict):
@@ -138,7 +156,9 @@ def _coverage(
 ) -> Exit:
     from socialai_dsl.evaluation import coverage
 
-    found = coverage(arguments.scenarios, arguments.agent or (), arguments.episodes, arguments.seed, clock)
+    found = coverage(
+        arguments.scenarios, arguments.agent or (), arguments.episodes or EPISODES, arguments.seed, clock
+    )
     documents.append(found.as_object())
     if not arguments.json:
         progress.above(sys.stdout)("\n".join(found.lines()))
@@ -155,7 +175,7 @@ def _scripts(
     end = Exit.GOOD
     for number, name in enumerate(arguments.scenarios):
         own = clock.part(len(arguments.scenarios) - number)
-        found = play_script(name, arguments.rooms, arguments.seed, arguments.states, own)
+        found = play_script(name, arguments.rooms or ROOMS, arguments.seed, arguments.states or STATES, own)
         documents.append(found.as_object())
         if not arguments.json:
             progress.above(sys.stdout)("\n".join(found.lines()))

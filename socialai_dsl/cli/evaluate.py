@@ -1,29 +1,45 @@
 """`socialai evaluate`: plays the test set with a trained agent, a script, chance or a language model."""
 
 import argparse
+import contextlib
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.arguments import natural, positive
+import socialai_dsl
+from socialai_dsl.cli.arguments import episodes, identifier, natural, refuse, seed
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.model_options import add_options, model_options
+from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_options
 from socialai_dsl.cli.terminal import json_text
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.export import keep_scenario
 from socialai_dsl.evaluation.players import (
+    HUMAN_FOLDER,
     MODEL_PREFIX,
+    UNTRAINED,
     Player,
-    default_folder,
     folder_of,
     named_agent,
     require_trainer,
     resolve_device,
+    session_folder,
 )
-from socialai_dsl.evaluation.recordings import record
+from socialai_dsl.evaluation.recordings import write_recordings
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
-from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent, own_scenario
-from socialai_dsl.run_folder import REPLAY, RESULT, SETTINGS, versions, write_json, write_text
+from socialai_dsl.evaluation.testing import Evaluation, own_scenario, play_test_set
+from socialai_dsl.replay.endings import short_name
+from socialai_dsl.run_folder import (
+    REPLAY,
+    RESULT,
+    SETTINGS,
+    only_writer,
+    scenario_folder_name,
+    versions,
+    write_json,
+    write_text,
+)
 from trainer.config import RunConfig
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
@@ -46,24 +62,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the scenario to play (repeatable; default: that of the run)",
     )
     parser.add_argument(
-        "--episodes", type=positive, default=500, metavar="N", help="number of test episodes (default: 500)"
+        "--episodes", type=episodes, default=500, metavar="N", help="number of test episodes (default: 500)"
     )
     parser.add_argument(
         "--greedy",
         action="store_true",
+        default=None,
         help="take the most probable action (default: sample)",
     )
     parser.add_argument(
         "--seed",
-        type=natural,
-        default=0,
+        type=seed,
         metavar="N",
         help="seed of the sampling (default: 0); the rooms are always the same",
     )
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "cuda"),
-        default="auto",
         help="where the network runs (default: auto)",
     )
     parser.add_argument("--net", metavar="mine:Net", help="import this code, for a network of your own")
@@ -81,6 +96,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"with --out: record up to N successes and N failures (default: {_RECORDED})",
     )
     parser.add_argument(
+        "--participant",
+        type=identifier,
+        metavar="ID",
+        help="for the agent human: begins the name of the session's folder (default: the time alone)",
+    )
+    parser.add_argument(
         "--json", action="store_true", help="print a JSON array with one object for each scenario"
     )
     add_options(parser)
@@ -92,22 +113,38 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
     if arguments.run == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
+    _refuse_what_does_not_apply(arguments)
     player = _player(arguments)
-    out = player.out if player.options is not None else arguments.out
+    if player.agent == "human":  # every session has a folder of its own
+        return _evaluate(arguments, player, player.out)
+    out = player.kept_in if player.is_model else arguments.out
+    with only_writer(out) if out is not None else contextlib.nullcontext():
+        return _evaluate(arguments, player, out)
+
+
+def _evaluate(arguments: argparse.Namespace, player: Player, out: Path | None) -> Exit:
+    """Evaluate on each scenario; the caller is the only writer of the folder `out`."""
     results = []
     for scenario in arguments.on or [own_scenario(arguments.run)]:
         playing = replace(player, agent=named_agent(player.agent, scenario))
-        evaluation = evaluate_agent(playing, scenario, arguments.episodes)
+        loaded = socialai_dsl.load(scenario)
+        kept = None
+        if out is not None:
+            place = out / scenario_folder_name(scenario)
+            place.mkdir(parents=True, exist_ok=True)
+            kept = keep_scenario(place, scenario, loaded).scenario
+            # As a run that trained nothing, so that reports take it as one.
+            settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
+            write_json(place / SETTINGS, settings)
+        evaluation = play_test_set(playing, scenario, loaded, compiled(loaded), arguments.episodes)
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        results.append(_result(evaluation))
+        results.append(_result(evaluation, kept or scenario))
         if not arguments.json:
             print(_table(evaluation, results[-1]["eval"]), flush=True)
         if out is not None:
             count = _RECORDED if arguments.record is None else arguments.record
-            place = record(evaluation, out, count, f"agent {arguments.run}")
-            # As a run that trained nothing, so that reports take it as one.
-            write_json(place / SETTINGS, {key: results[-1][key] for key in ("scenario", "agent", "seed")})
+            place = write_recordings(evaluation, out, count, f"agent {short_name(arguments.run)}")
             write_json(place / RESULT, results[-1])
             if not arguments.json:
                 replay = f", to look at in {place / REPLAY}" if (place / REPLAY).is_file() else ""
@@ -119,30 +156,47 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
+def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
+    """Refuse, by name, what the agent would ignore."""
+    agent = arguments.run
+    names = {"greedy", "seed", "device", "net", "participant", *MODEL_OPTIONS}
+    if agent.startswith(MODEL_PREFIX):
+        names -= set(MODEL_OPTIONS)
+    elif agent in UNTRAINED:
+        names -= {"random": {"seed"}, "human": {"participant"}}.get(agent, set())
+    else:
+        names -= {"greedy", "seed", "device", "net"}
+    refuse(arguments, names, f"the agent {agent!r} has no use for it")
+
+
 def _player(arguments: argparse.Namespace) -> Player:
     """Who plays, and how."""
     agent = arguments.run
     if agent.startswith(MODEL_PREFIX):
-        return Player(agent, out=arguments.out or default_folder(agent), options=model_options(arguments))
-    if agent in ("random", "oracle", "human"):
-        return Player(agent, seed=arguments.seed)
+        return Player(agent, out=arguments.out, options=model_options(arguments))
+    if agent == "human":
+        return Player(agent, out=session_folder(arguments.out or HUMAN_FOLDER, arguments.participant))
+    drawn = arguments.seed or 0
+    if agent in UNTRAINED:
+        return Player(agent, seed=drawn)
     require_trainer()
     has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
     scenario = own_scenario(agent) if has_own else arguments.on[0]
     return Player(
         agent,
-        resolve_device(arguments.device),
-        arguments.greedy,
-        arguments.seed,
+        resolve_device(arguments.device or "auto"),
+        bool(arguments.greedy),
+        drawn,
         arguments.net,
-        RunConfig(scenario=scenario).code_folder,
+        RunConfig(scenario=scenario).within(folder_of(agent) if has_own else Path()).code_folder,
     )
 
 
-def _result(evaluation: Evaluation) -> dict[str, Any]:
+def _result(evaluation: Evaluation, scenario: str) -> dict[str, Any]:
+    """The figures, of a scenario that is called so in the folder that they are written to."""
     return {
-        "scenario": evaluation.scenario,
-        "agent": evaluation.player.agent,
+        "scenario": scenario,
+        "agent": short_name(evaluation.player.agent),
         "greedy": evaluation.player.greedy,
         "seed": evaluation.player.seed,
         "warnings": list(evaluation.warnings),

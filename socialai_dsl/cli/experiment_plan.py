@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_document import asked_for, workers
 from socialai_dsl.cli.experiment_measure import measure_unknown
@@ -14,6 +15,8 @@ from socialai_dsl.experiments.folder import runs_of
 
 def plan(arguments: argparse.Namespace) -> Exit:
     """Print the plan."""
+    if arguments.json:
+        refuse(arguments, ("each",), "the JSON object has every run")
     document, folder = asked_for(arguments)
     runs = runs_of(folder, document)
     speeds = Speeds(runs)

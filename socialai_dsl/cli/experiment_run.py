@@ -25,6 +25,7 @@ from socialai_dsl.experiments.engines.ray import RayEngine
 from socialai_dsl.experiments.engines.slurm import SlurmEngine
 from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, Run, runs_of
 from socialai_dsl.experiments.work import Outcome
+from socialai_dsl.run_folder import only_writer
 
 
 def run(arguments: argparse.Namespace) -> Exit:
@@ -35,7 +36,8 @@ def run(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--address: only the engine `ray` has one")
     if arguments.slurm and arguments.engine != "slurm":
         raise UsageError("--slurm: only the engine `slurm` has jobs")
-    _prepare(folder, document, arguments)
+    with only_writer(folder):  # the runs have locks of their own, so that several commands may work on them
+        _prepare(folder, document, arguments)
     engine = _engine(arguments, document, folder)
     return work_on(folder, document, runs_of(folder, document), engine, arguments.json)
 
@@ -51,7 +53,6 @@ def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespa
                 f"{folder} is of another experiment or of an earlier state of this one:{listed}\n"
                 "Choose another --out; or let the folder follow with --update, which keeps the runs that are the same"
             )
-    folder.mkdir(parents=True, exist_ok=True)
     runs = folder / RUNS
     if arguments.runs is not None and runs.resolve() != arguments.runs.resolve():
         if runs.exists() or runs.is_symlink():

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_document import kept
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
@@ -10,11 +11,13 @@ from socialai_dsl.cli.terminal import counted, json_text
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments import work
-from socialai_dsl.experiments.folder import Run, runs_of
+from socialai_dsl.experiments.folder import Run, runs_of, worker_of
 
 
 def status(arguments: argparse.Namespace) -> Exit:
     """Print how far the runs are."""
+    if arguments.json:
+        refuse(arguments, ("each",), "the JSON object has every run")
     document = kept(arguments.folder)
     figures = status_figures(document, arguments.folder, runs_of(arguments.folder, document))
     print(json_text(figures) if arguments.json else status_text(figures, arguments.each))
@@ -44,7 +47,10 @@ def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed:
     else:
         print(f"{counted(len(changed), 'run')} {state}")
         for run in missed:
-            print(f"{run.label} ({run.id}): another process is working on it", file=sys.stderr)
+            print(
+                f"{run.label} ({run.id}): {worker_of(run.path) or 'a process'} is working on it",
+                file=sys.stderr,
+            )
     return Exit.FINDINGS if missed else Exit.GOOD
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import RESULT, read_json, scenario_folder_name
+from socialai_dsl.run_folder import LOCK_FILES, RESULT, only_writer, read_json, scenario_folder_name
 
 if TYPE_CHECKING:
     from trainer.config import RunConfig
@@ -39,10 +39,15 @@ def execute(arguments: argparse.Namespace) -> Exit:
     config, loaded, checkpoint = finished_agent(run)
     if socialai_dsl.compile(loaded).sha256 != checkpoint.meta.program_sha256:
         print("warning: the scenario has changed since the agent was trained on it", file=sys.stderr)
-    out = _new_folder(arguments.out or Path("exports") / _name(config))
-    if (run / _FILM).is_file():
-        shutil.copyfile(run / _FILM, out / _FILM)
-    write_agent(out, config, loaded, checkpoint, read_json(run / RESULT))
+    out: Path = arguments.out or Path("exports") / _name(config)
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"--out: {out} is a file; choose another folder")
+    with only_writer(out):
+        if any(file.name not in LOCK_FILES for file in out.iterdir()):
+            raise UsageError(f"--out: {out} is there already; choose another folder")
+        if (run / _FILM).is_file():
+            shutil.copyfile(run / _FILM, out / _FILM)
+        write_agent(out, config, loaded, checkpoint, read_json(run / RESULT))
     print(f"written to {out}; try it: socialai evaluate {out}")
     return Exit.GOOD
 
@@ -50,10 +55,3 @@ def execute(arguments: argparse.Namespace) -> Exit:
 def _name(config: "RunConfig") -> str:
     net = config.net.replace(":", ".")
     return f"{scenario_folder_name(config.scenario)}-{net}-s{config.seed}"
-
-
-def _new_folder(out: Path) -> Path:
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise UsageError(f"--out: {out} is there already; choose another folder")
-    out.mkdir(parents=True, exist_ok=True)
-    return out

@@ -154,6 +154,9 @@ def _explain(program: str, error: Exception) -> Exit:
         if isinstance(error, UsageError):
             return Exit.USAGE
         return Exit.STOPPED if isinstance(error, RunFailed) else Exit.FINDINGS
+    if isinstance(error, MemoryError):
+        print(f"{program}: this machine has too little memory for what was asked", file=sys.stderr)
+        return Exit.USAGE
     if isinstance(error, OSError):
         place = f": {error.filename}" if error.filename is not None else ""
         print(printable(f"{program}: {error.strerror or error}{place}"), file=sys.stderr)

@@ -2,9 +2,13 @@
 
 import argparse
 from dataclasses import fields
+from typing import Final
 
-from socialai_dsl.cli.arguments import STYLE, positive, seconds
+from socialai_dsl.cli.arguments import STYLE, at_once, number_between, positive, seconds
+from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.players import ModelOptions
+
+MODEL_OPTIONS: Final = tuple(field.name for field in fields(ModelOptions))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +21,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--key-from",
-        default="OPENAI_API_KEY",
         metavar="NAME",
         help="environment variable that holds the key (default: OPENAI_API_KEY)",
     )
@@ -25,7 +28,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--mode",
         choices=("text", "json", "tools"),
-        default="text",
         help="how the model gives its actions (default: text)",
     )
     group.add_argument(
@@ -34,39 +36,43 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of observations in a request (default: the whole episode)",
     )
-    group.add_argument("--temperature", type=float, metavar="X", help="temperature (default: the server's)")
+    group.add_argument(
+        "--temperature",
+        type=number_between(0, 100),
+        metavar="X",
+        help="temperature (default: the server's)",
+    )
     group.add_argument(
         "--max-tokens", type=positive, metavar="N", help="longest reply (default: the server's)"
     )
     group.add_argument(
         "--on-invalid",
         choices=("noop", "retry", "fail"),
-        default="noop",
         help="what a reply without an action does: pass the turn (default), ask again, or end the episode",
     )
     group.add_argument(
-        "--goal", default="", metavar="TEXT", help="what to tell the model about the aim (default: nothing)"
+        "--goal", metavar="TEXT", help="what to tell the model about the aim (default: nothing)"
     )
     group.add_argument(
-        "--grammar", action="store_true", help="constrain replies by a grammar (servers of llama.cpp)"
+        "--grammar",
+        action="store_true",
+        default=None,
+        help="constrain replies by a grammar (servers of llama.cpp)",
     )
     group.add_argument(
         "--probes",
         choices=("apart", "kept", "off"),
-        default="apart",
         help="ask the scenario's probes apart from play (default), keep them in later requests, or do not ask",
     )
     group.add_argument(
         "--concurrency",
-        type=positive,
-        default=4,
+        type=at_once,
         metavar="N",
         help="number of episodes played at once (default: 4)",
     )
     group.add_argument(
         "--timeout",
         type=seconds,
-        default=120.0,
         metavar="SECONDS",
         help="time limit of one reply (default: 120)",
     )
@@ -84,4 +90,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def model_options(arguments: argparse.Namespace) -> ModelOptions:
     """What was typed, as the evaluation takes it."""
-    return ModelOptions(**{field.name: getattr(arguments, field.name) for field in fields(ModelOptions)})
+    if arguments.grammar and arguments.mode not in (None, "text"):
+        raise UsageError(
+            f"--grammar: replies of --mode {arguments.mode} have a form already; it is for --mode text"
+        )
+    given = {name: getattr(arguments, name) for name in MODEL_OPTIONS}
+    return ModelOptions(**{name: value for name, value in given.items() if value is not None})

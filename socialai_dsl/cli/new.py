@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.authoring.templates import SCHEMA, TEMPLATES, template_files
+from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -25,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--template",
         choices=TEMPLATES,
-        default="ask-a-guide",
         help="template to start from (default: ask-a-guide)",
     )
     parser.add_argument("--list", action="store_true", help="list the templates and exit")
@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the files, and the schema for editors beside them; nothing is written if one of them exists."""
     if arguments.list:
+        refuse(arguments, ("name", "template"), "--list lists the templates and writes nothing")
         width = max(map(len, TEMPLATES))
         print("\n".join(f"{name:{width}}  {about}" for name, about in TEMPLATES.items()))
         return Exit.GOOD
@@ -44,7 +45,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError(
             f"NAME: expected letters, digits and underscores (at most 40), got {arguments.name!r}"
         )
-    files = template_files(arguments.template, name)
+    files = template_files(arguments.template or "ask-a-guide", name)
     for path in files:
         if path.exists() or path.is_symlink():
             raise UsageError(f"{path} exists already")

@@ -1,11 +1,15 @@
 """`socialai play`: a person plays a scenario in the terminal."""
 
 import argparse
+import sys
+from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.arguments import natural
+from socialai_dsl.cli.arguments import identifier, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.evaluation.players import HUMAN_FOLDER, session_folder
+from socialai_dsl.run_folder import scenario_folder_name
 
 SUMMARY: Final = "play a scenario in the terminal"
 
@@ -17,10 +21,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=natural,
+        type=seed,
         default=0,
         metavar="N",
         help="seed of the first episode (default: 0); later episodes have the next seeds",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=HUMAN_FOLDER,
+        metavar="DIR",
+        help=f"folder that gets a folder of this session with every step (default: {HUMAN_FOLDER})",
+    )
+    parser.add_argument(
+        "--participant",
+        type=identifier,
+        metavar="ID",
+        help="begins the name of the session's folder (default: the time alone)",
     )
 
 
@@ -28,10 +45,15 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Play episode after episode until the player quits."""
     from socialai_dsl.play import play
 
-    def episode(number: int) -> tuple[str, dict[str, Any]]:
-        seed = arguments.seed + number
-        return f"{arguments.scenario}, seed {seed}", {"seed": seed}
+    name = scenario_folder_name(arguments.scenario)
+    session = session_folder(arguments.out, arguments.participant)
 
-    for played in play(arguments.scenario, episode):
+    def episode(number: int) -> tuple[str, dict[str, Any]]:
+        own = arguments.seed + number
+        return f"{name}, seed {own}", {"seed": own}
+
+    about = {"session": session.name, "scenario": name}
+    for played in play(arguments.scenario, episode, session / name, about):
         print(printable(str(played)))
+    print(f"every step is in {session / name}", file=sys.stderr)
     return Exit.GOOD

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.arguments import natural, positive
+from socialai_dsl.cli.arguments import episode, episodes, positive, refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import counted
 from socialai_dsl.errors import UsageError, first_mistake
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "write a web page to watch episodes step by step, with rules and reasons"
 _RECORDED: Final = 5
+_PLAYED: Final = 100
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,21 +45,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--episodes",
-        type=positive,
-        default=100,
+        type=episodes,
         metavar="N",
-        help="number of test episodes to play (default: 100)",
+        help=f"number of test episodes to play (default: {_PLAYED})",
     )
     parser.add_argument(
         "--record",
         type=positive,
-        default=_RECORDED,
         metavar="N",
         help=f"keep up to N successes and N failures (default: {_RECORDED})",
     )
     parser.add_argument(
         "--test-episode",
-        type=natural,
+        type=episode,
         action="append",
         metavar="N",
         help="keep only test episode N (repeatable)",
@@ -76,7 +75,12 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
     if arguments.out.suffix not in (".html", ".json"):
         raise UsageError(f"--out: got {arguments.out}, expected a name that ends in .html or .json")
-    traces = _read(Path(arguments.source)) if arguments.source.endswith(".json") else _played(arguments)
+    if arguments.source.endswith(".json"):
+        idle = ("agent", "episodes", "record", "test_episode", "greedy")
+        refuse(arguments, idle, f"{arguments.source} holds episodes that were played already")
+        traces = _read(Path(arguments.source))
+    else:
+        traces = _played(arguments)
     if arguments.out.suffix == ".json":
         write_text(arguments.out, "[" + ",\n".join(trace.as_json() for trace in traces) + "]\n")
     else:
@@ -116,11 +120,14 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
         UsageError: a language model has not played one that was asked for.
     """
     numbers = arguments.test_episode
-    evaluation = _evaluation(arguments, arguments.episodes if numbers is None else max(numbers) + 1)
+    if numbers is not None:
+        refuse(arguments, ("episodes", "record"), "--test-episode says which episodes are played and kept")
+    played = arguments.episodes or _PLAYED
+    evaluation = _evaluation(arguments, played if numbers is None else max(numbers) + 1)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     if numbers is None:
-        return evaluation.traces(evaluation.to_replay(arguments.record))
+        return evaluation.traces(evaluation.to_replay(arguments.record or _RECORDED))
     for number in numbers:
         if number not in evaluation.actions:
             raise UsageError(
@@ -130,9 +137,14 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
-    from socialai_dsl.evaluation.players import MODEL_PREFIX, Player, folder_of, named_agent
+    from socialai_dsl.evaluation.players import MODEL_PREFIX, UNTRAINED, Player, folder_of, named_agent
     from socialai_dsl.evaluation.scripts import script_of
-    from socialai_dsl.evaluation.testing import evaluate_agent, evaluation_of_model, own_scenario
+    from socialai_dsl.evaluation.testing import (
+        evaluate_agent,
+        evaluation_of_model,
+        evaluation_of_person,
+        own_scenario,
+    )
 
     source = arguments.source
     folder = folder_of(source)
@@ -143,10 +155,20 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
             )
         agent, scenario = source, own_scenario(source)
         played_by = str(read_json(folder / SETTINGS).get("agent"))
+        if played_by == "human" or played_by.startswith(MODEL_PREFIX):
+            refuse(arguments, ("greedy",), f"the agent {played_by!r} has played already")
+        if played_by == "human":
+            return evaluation_of_person(folder, scenario, episodes)
         if played_by.startswith(MODEL_PREFIX):
             return evaluation_of_model(folder, played_by, scenario, episodes)
     else:
         scenario = source
         usual = "oracle" if script_of(scenario) is not None else "random"
         agent = named_agent(arguments.agent or usual, scenario)
+        if agent == "human" or agent.startswith(MODEL_PREFIX):
+            raise UsageError(
+                f"--agent: got {agent!r}, who plays for `socialai evaluate`; what that writes is replayed by its folder"
+            )
+        if agent in UNTRAINED:
+            refuse(arguments, ("greedy",), f"the agent {agent!r} has no use for it")
     return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)

@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.curves import draw_curves
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import write_text
+from socialai_dsl.run_folder import only_writer, write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.baselines import Baselines
@@ -49,15 +50,15 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Read, compute, draw, write."""
     require_libraries()
     if arguments.curves is not None:
+        refuse(arguments, ("out", "no_baselines"), "--curves draws the curves alone, into its own FILE")
         return draw_curves(arguments.folders, arguments.curves)
     from socialai_dsl.reporting.analysis import analyse
 
     experiment, place = _experiment(arguments.folders)
     out = arguments.out or place / FOLDER
-    out.mkdir(parents=True, exist_ok=True)
-    measured, notes = _baselines(experiment, out / BASELINES, arguments.no_baselines)
-    analysis = analyse(experiment, measured, notes)
-    _write(analysis, out)
+    with only_writer(out):
+        measured, notes = _baselines(experiment, out / BASELINES, arguments.no_baselines)
+        _write(analyse(experiment, measured, notes), out)
     print(f"written to {out / 'index.html'}")
     return Exit.GOOD
 

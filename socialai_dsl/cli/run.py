@@ -11,7 +11,7 @@ from socialai_dsl.run_folder import (
     REPLAY,
     RESULT,
     SETTINGS,
-    create_run_folder,
+    new_run_folder,
     only_writer,
     versions,
     write_json,
@@ -42,43 +42,72 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
-    from socialai_dsl.cli.run_options import resumed, started
+    from socialai_dsl.cli.run_options import check_resumable, resumed, started
+    from socialai_dsl.cli.training import discard_unstarted
+    from socialai_dsl.diagnostics import ScenarioError
     from socialai_dsl.envs.factory import compiled
+    from socialai_dsl.errors import RunFailed, UsageError
+    from socialai_dsl.evaluation.export import keep_run
     from socialai_dsl.evaluation.players import require_trainer
 
     require_trainer()
-    config, loaded = resumed(arguments) if arguments.resume else started(arguments)
+    folder: Path | None = arguments.resume
+    if folder is not None:
+        check_resumable(arguments)  # so that no folder is made where there is none
+        with only_writer(folder):
+            config, loaded = resumed(arguments)
+            return _run(config, loaded, compiled(loaded), folder, arguments)
+    config, loaded = started(arguments)
     program = compiled(loaded)
-    folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
-    with only_writer(folder):
-        return _run(config, loaded, program, folder, arguments)
+    with new_run_folder(arguments.out, config.scenario, config.seed) as folder:
+        before = set(folder.iterdir())
+        copied: set[Path] = set()
+        try:
+            try:
+                config = keep_run(folder, config, loaded)
+            finally:
+                copied = set(folder.iterdir()) - before
+            return _run(config, loaded, program, folder, arguments)
+        except (ScenarioError, UsageError, RunFailed):
+            if config.trains:
+                discard_unstarted(folder, copied)
+            raise
 
 
 def _run(
-    config: "RunConfig", loaded: "Loaded", program: "Playable", folder: Path, arguments: argparse.Namespace
+    config: "RunConfig",
+    loaded: "Loaded",
+    program: "Playable",
+    folder: Path,
+    arguments: argparse.Namespace,
 ) -> Exit:
     """Train if the agent is to be trained, evaluate, write everything down."""
-    from socialai_dsl.cli.training import draw_curve, record_run, train_in, training_figures, write_card
+    from socialai_dsl.cli.training import draw_curve, record_run, train_agent, training_figures, write_card
     from socialai_dsl.evaluation.players import Player
     from socialai_dsl.evaluation.testing import play_test_set
+    from socialai_dsl.replay.endings import short_name
 
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
     agent, training = config.agent, _NOT_TRAINED
     write_json(folder / SETTINGS, config.model_dump())
-    print(f"{config.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
+    print(
+        f"{arguments.scenario or config.scenario}: {_size(program)}; writing to {folder}",
+        file=stream,
+        flush=True,
+    )
     if config.trains:
-        agent = train_in(config, loaded, program, folder, bool(arguments.resume), stream)
+        agent = str(train_agent(config, loaded, program, folder, bool(arguments.resume), stream))
         training = training_figures(folder)
     # What is trained differs by its training; what is not, by what it draws.
     drawn = 0 if config.trains else config.seed
-    player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder)
-    evaluation = play_test_set(player, config.scenario, loaded, program, config.eval_episodes)
+    player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder, out=folder)
+    evaluation = play_test_set(player, config.played, loaded, program, config.eval_episodes)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     result = {
         "scenario": config.scenario,
-        "agent": config.agent,
+        "agent": short_name(config.agent),
         "seed": config.seed,
         **({"recipe": config.recipe, "guide": config.guide} if config.trains else {}),
         **training,
@@ -86,7 +115,7 @@ def _run(
         "program_sha256": program.sha256,
         "versions": versions(),
     }
-    record_run(evaluation, folder, f"agent {config.agent}, seed {config.seed}")
+    record_run(evaluation, folder, f"agent {short_name(config.agent)}, seed {config.seed}")
     if config.trains:
         draw_curve(config, folder, result)
         write_card(config, loaded, folder, Path(agent), result)

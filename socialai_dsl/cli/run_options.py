@@ -3,13 +3,15 @@
 import argparse
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, Final, get_args
 
 from pydantic import ValidationError
 
 from socialai_dsl.checking.loaded import Loaded, guided_options
+from socialai_dsl.cli.arguments import whole_number
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.settings import resolved_config
@@ -28,6 +30,12 @@ _AUTOMATIC: Final = {
 
 _OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
 """Options that matter to agents that are not trained."""
+
+_OF_PART: Final = {
+    "guide": ("guide_share", "imitation_coef"),
+    "bonus": ("bonus_c", "bonus_m", "bonus_t", "bonus_formula"),
+}
+"""Options that mean nothing where a run has no guide, or no bonus."""
 
 _MOST_THREADS: Final = 4
 """More threads than this wait for Python's interpreter lock rather than compute."""
@@ -50,7 +58,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices = ("auto", "cpu", "cuda") if name == "device" else _choices(field.annotation)
         number = field.annotation is int
         metavar = None if choices else "N" if number else "NAME"
-        kind: Any = _whole_number if number else str
+        kind: Any = whole_number if number else str
         parser.add_argument(
             *words, dest=name, type=kind, choices=choices, metavar=metavar, help=_escaped(about)
         )
@@ -78,14 +86,6 @@ def _escaped(text: str | None) -> str:
     return (text or "").replace("%", "%%")
 
 
-def _whole_number(text: str) -> int:
-    """`1_000` and `1,000` are 1000; the bounds are `RunConfig`'s."""
-    try:
-        return int(text.replace("_", "").replace(",", ""))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
-
-
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
 
@@ -104,14 +104,12 @@ def started(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
     return new_config(arguments)
 
 
-def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
-    """The configuration of a run that was stopped, and its scenario.
+def check_resumable(arguments: argparse.Namespace) -> RunConfig:
+    """The configuration of the run that `--resume` names, as its folder has it.
 
-    What is typed may change how it goes on, as `--frames` and `--threads` do, and not what it computes.
+    Raises:
+        UsageError: there is no such run, it is none that trains, or more is named than the folder.
     """
-    import socialai_dsl
-    from socialai_dsl.evaluation.players import resolve_device
-
     folder: Path = arguments.resume
     if arguments.scenario is not None or arguments.out is not None:
         raise UsageError(
@@ -123,8 +121,20 @@ def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
         raise UsageError(f"--resume: {error}") from None
     if not config.trains:
         raise UsageError(f"--resume: the agent {config.agent!r} of {folder} is not trained")
+    return config
+
+
+def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
+    """The configuration of a run that was stopped, and its scenario.
+
+    What is typed may change how it goes on, as `--frames` and `--threads` do, and not what it computes.
+    """
+    import socialai_dsl
+    from socialai_dsl.evaluation.players import resolve_device
+
+    config = check_resumable(arguments)
     resumed = checked_config(config.model_dump() | _typed_options(arguments))
-    resumed = resumed.model_copy(update={"device": resolve_device(resumed.device)})
+    resumed = resumed.model_copy(update={"device": resolve_device(resumed.device)}).within(arguments.resume)
     if changed := config.differences(resumed):  # before its folder says otherwise
         name, reason = changed[0], "because a run goes on with the options it began with"
         if name == "frames":
@@ -132,7 +142,7 @@ def resumed(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
         raise UsageError(
             f"{_typed(name)}: got {getattr(resumed, name)}, expected {getattr(config, name)}, {reason}"
         )
-    return resumed, socialai_dsl.load(resumed.scenario)
+    return resumed, socialai_dsl.load(resumed.played)
 
 
 def new_config(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
@@ -155,9 +165,16 @@ def new_config(arguments: argparse.Namespace) -> tuple[RunConfig, Loaded]:
         return checked_config(given | {"frames": 0}), loaded
     given.setdefault("threads", automatic_threads())
     recipe = given["recipe"] = given.get("recipe") or _usual_recipe(given, arguments.scenario, loaded)
+    typed = given
     if given.get("net") not in NET_PRESETS:
         given = usual_for(recipe, loaded) | given
-    return checked_config(given), loaded
+    config = checked_config(given)
+    _refuse_what_is_idle(typed, config)
+    if config.curriculum.endswith((".yaml", ".yml")):
+        socialai_dsl.load_curriculum(
+            config.curriculum
+        )  # what is wrong with it is said before a folder is made
+    return config, loaded
 
 
 def checked_config(given: dict[str, Any]) -> RunConfig:
@@ -176,10 +193,21 @@ def checked_config(given: dict[str, Any]) -> RunConfig:
         raise UsageError(f"{_typed(name)}: {said}") from None
 
 
+def _refuse_what_is_idle(typed: Iterable[str], config: RunConfig) -> None:
+    """Refuse what was typed and belongs to something that this run does not have."""
+    for name in typed:
+        for part in ("guide", "bonus"):
+            if name in _OF_PART[part] and getattr(config, part) == "none":
+                raise UsageError(f"{_typed(name)}: it is for a {part}, and this run has none (--{part})")
+
+
 def _refuse_training_options(given: dict[str, Any]) -> None:
+    agent = given["agent"]
     for name in given:
         if name not in _OF_ANY_AGENT:
-            raise UsageError(f"{_typed(name)}: the agent {given['agent']!r} is not trained")
+            raise UsageError(f"{_typed(name)}: the agent {agent!r} is not trained")
+        if agent in BUILT_IN_AGENTS and name in ("device", "net"):
+            raise UsageError(f"{_typed(name)}: the agent {agent!r} has no network")
 
 
 def _typed(name: str) -> str:
@@ -215,10 +243,12 @@ def _plain_value(name: str, written: str) -> bool | int | float | str | None:
     """A number, true, false or null as JSON writes them; else the word itself."""
     try:
         value = json.loads(written)
-    except ValueError:
+    except (ValueError, RecursionError):
         return written
     if not isinstance(value, bool | int | float | str | None):
-        raise UsageError(f"--hyper: got {name}={written}, expected a number, a word, true, false or null")
+        raise UsageError(
+            f"--hyper {name}: got {shortened(written)}, expected a number, a word, true, false or null"
+        )
     return value
 
 

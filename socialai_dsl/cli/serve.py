@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from typing import Final
 
-from socialai_dsl.cli.arguments import STYLE, natural, positive, seconds
+from socialai_dsl.cli.arguments import STYLE, port, positive, seconds
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "localhost and 127.0.0.1, and all others are refused",
     )
     parser.add_argument(
-        "--port", type=natural, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
+        "--port", type=port, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
     parser.add_argument("--style", **STYLE)
     parser.add_argument(
@@ -67,16 +67,16 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.llm.openenv import application
 
     hosts = [arguments.host, *arguments.allow]
-    app = application(program, arguments.style, arguments.sessions, hosts, arguments.idle or IDLE)
+    app = application(program, arguments.style or "prose", arguments.sessions, hosts, arguments.idle or IDLE)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
     try:
         listening = socket.create_server((arguments.host, arguments.port), family=family)
     except (OSError, OverflowError) as error:
         raise UsageError(f"cannot serve on {arguments.host}:{arguments.port}: {error}") from None
     with listening:
-        address, port = listening.getsockname()[:2]
+        address, number = listening.getsockname()[:2]
         shown = f"[{address}]" if ":" in address else address
-        print(f"{program.name} at http://{shown}:{port}, Ctrl-C stops it", file=sys.stderr, flush=True)
+        print(f"{program.name} at http://{shown}:{number}, Ctrl-C stops it", file=sys.stderr, flush=True)
         config = uvicorn.Config(app, log_level="warning", ws_max_size=MOST_BYTES)
         uvicorn.Server(config).run(sockets=[listening])
     return Exit.GOOD

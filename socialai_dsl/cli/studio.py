@@ -9,6 +9,7 @@ import webbrowser
 from pathlib import Path
 from typing import Final
 
+from socialai_dsl.cli.arguments import natural
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import SUFFIXES
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="address to listen on (default: this machine only)",
     )
     parser.add_argument(
-        "--port", type=int, metavar="N", help=f"port (default: {_PORT}, or the next free one)"
+        "--port", type=natural, metavar="N", help=f"port (default: {_PORT}, or the next free one)"
     )
     parser.add_argument(
         "--no-browser", action="store_true", help="print the address and do not open a browser"

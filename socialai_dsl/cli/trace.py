@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.arguments import natural, positive
+from socialai_dsl.cli.arguments import episode, natural, positive, refuse, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Text
@@ -24,10 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
     )
     parser.add_argument(
-        "--seed", type=natural, default=0, metavar="N", help="seed of the episode (default: 0)"
+        "--seed",
+        type=seed,
+        metavar="N",
+        help="seed of the episode (default: 0), and of an agent that samples",
     )
     parser.add_argument(
-        "--test-episode", type=natural, metavar="N", help="play episode N of the test set instead of a seed"
+        "--test-episode", type=episode, metavar="N", help="play episode N of the test set instead of a seed"
     )
     parser.add_argument(
         "--index",
@@ -75,10 +78,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play the episode and print it."""
-    reset = reset_of(arguments.seed, arguments.index, arguments.test_episode, arguments.layout)
+    if arguments.test_episode is not None and arguments.do is not None:
+        refuse(arguments, ("seed",), "--test-episode says which room it is, and --do what is done there")
+    drawn = arguments.seed or 0
+    reset = reset_of(drawn, arguments.index, arguments.test_episode, arguments.layout)
     if arguments.json and (arguments.why or arguments.first > 1):
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
-    traced = EpisodeTracer(arguments.scenario, arguments.agent, arguments.do, arguments.seed)
+    traced = EpisodeTracer(arguments.scenario, arguments.agent, arguments.do, drawn)
     try:
         trace = traced.begin(reset)
         _check_names(arguments.why, trace)

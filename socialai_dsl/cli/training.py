@@ -2,8 +2,9 @@
 
 import contextlib
 import json
+import shutil
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
@@ -12,7 +13,6 @@ from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.cli.learnt import Learnt
 from socialai_dsl.cli.progress import TrainingProgress
 from socialai_dsl.cli.stopping import Stop
-from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.evaluation.model_card import FILE, model_card
@@ -21,31 +21,27 @@ from socialai_dsl.evaluation.testing import Evaluation
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
-from socialai_dsl.run_folder import LOCK, REPLAY, SETTINGS, scenario_folder_name, write_text
+from socialai_dsl.run_folder import LOCK_FILES, REPLAY, SETTINGS, scenario_folder_name, write_text
 from trainer.config import RunConfig
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.tracking import WandbTracker
 
 
-def train_in(
-    config: RunConfig, loaded: Loaded, program: Playable, folder: Path, resume: bool, stream: IO[str]
-) -> str:
-    """Train in the run's folder and return the path of the final checkpoint."""
-    try:
-        return str(train_agent(config, loaded, program, folder, resume, stream))
-    except (ScenarioError, UsageError, RunFailed):
-        _discard_unstarted(folder)
-        raise
+def discard_unstarted(folder: Path, copied: Iterable[Path]) -> None:
+    """Take back the folder of a run that could not even begin, so that the same command can be given again.
 
-
-def _discard_unstarted(folder: Path) -> None:
-    """Take back the folder of a run that could not even begin, so that the same command can be given again."""
+    Args:
+        folder: of the run.
+        copied: what was copied into it, which is removed.
+    """
     from trainer.checkpoint import FOLDER
 
     checkpoints = folder / FOLDER
     if not any(checkpoints.glob("*.safetensors")):
-        for file in (SETTINGS, LOCK):
+        for copy in copied:
+            shutil.rmtree(copy) if copy.is_dir() else copy.unlink()
+        for file in (SETTINGS, *LOCK_FILES):
             (folder / file).unlink(missing_ok=True)
         for empty in (checkpoints, folder):
             with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
@@ -126,8 +122,8 @@ def _played(config: RunConfig, loaded: Loaded) -> Loaded:
     if config.guide == "none":
         return loaded
     if config.guide == "script":
-        return with_script(config.scenario, loaded).loaded
-    scripted = script_of(config.scenario, loaded)
+        return with_script(config.played, loaded).loaded
+    scripted = script_of(config.played, loaded)
     return loaded if scripted is None else scripted.loaded
 
 
@@ -167,7 +163,7 @@ def write_card(
 ) -> None:
     """Write the model card of a run into its folder."""
     place = weights.relative_to(folder).as_posix()
-    write_text(folder / FILE, model_card(config, result, about_of(loaded), folder.as_posix(), place))
+    write_text(folder / FILE, model_card(config.within(Path()), result, about_of(loaded), ".", place))
 
 
 _REPLAYED: Final = 5

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.arguments import add_effort, positive
+from socialai_dsl.cli.arguments import ROOMS, add_effort, limit, positive, refuse
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.files import STDIN, given_files, standard_input
 from socialai_dsl.cli.reporters import REPORTERS, CheckedInput, limited
@@ -52,15 +52,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--stdin-filename",
-        default="stdin.yaml",
         metavar="PATH",
-        help="name for the file on standard input; files that it names are looked up beside this path",
+        help="name for the file on standard input (default: stdin.yaml); the files it names are looked up beside it",
     )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
-    results = [_checked(name, arguments.stdin_filename) for name in given_files(arguments.paths)]
+    if not arguments.deep:
+        refuse(arguments, ("rooms", "seconds"), "it is for --deep; nothing is played without")
+    if STDIN not in arguments.paths:
+        refuse(
+            arguments, ("stdin_filename",), "it names what is on standard input, which is read for the PATH -"
+        )
+    results = [
+        _checked(name, arguments.stdin_filename or "stdin.yaml") for name in given_files(arguments.paths)
+    ]
     checked = _without_used(results)
     if arguments.deep:
         right = [result for (_, result), c in zip(results, checked, strict=True) if not c.errors]
@@ -127,8 +134,8 @@ def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagno
     # What was checked, also where it came from standard input.
     texts = {source.path: source for source in result.sources.values() if source.path is not None}
     for scenario, called in scenarios_of(result.name, texts):
-        clock = Clock(arguments.seconds or None, progress.show)
-        effort = Effort(arguments.rooms, clock=clock)
+        clock = Clock(limit(arguments) or None, progress.show)
+        effort = Effort(arguments.rooms or ROOMS, clock=clock)
         report = check_scenario(scenario, called, effort, deep=True, say=say, texts=texts)
         progress.clear()
         found += report.findings()

@@ -16,7 +16,7 @@ from socialai_dsl.analysis.tally import Tally, TallyItem, parts_of, tally
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.players import UNTRAINED, Player, make_policy, named_agent, require_trainer
 from socialai_dsl.evaluation.scripts import script_of, with_script
 
 _TOGETHER: Final = 250
@@ -96,7 +96,7 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
                 seed,
                 clock,
             )
-        if agent != "oracle":
+        if agent not in UNTRAINED:
             require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:

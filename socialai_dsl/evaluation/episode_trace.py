@@ -3,7 +3,7 @@
 import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,15 @@ from socialai_dsl import replay
 from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.episodes import Policy
+from socialai_dsl.evaluation.players import Player, make_policy, player_of, require_trainer
 from socialai_dsl.evaluation.scripts import with_script
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.state import cast_of, changes
+
+Agent = str | Path | Player | Policy | Callable[[Any], Any]
+"""What `players.player_of` takes."""
 
 
 @dataclass
@@ -75,7 +79,7 @@ class Trace:
 
 def trace(
     scenario: str,
-    agent: str | None = None,
+    agent: Agent | None = None,
     do: Sequence[str] | None = None,
     **episode: Any,
 ) -> Trace:
@@ -83,7 +87,8 @@ def trace(
 
     Args:
         scenario: a path or a name, with `+variants` and `?parameters`.
-        agent: oracle, random, shipped, or a checkpoint or run folder (default: oracle where there is one, else random).
+        agent: oracle, random, shipped, a checkpoint or run folder, a `Player`, or a policy or function of your own, see
+            `evaluate_agent` (default: oracle where there is one, else random).
         do: what the agent does, step by step, as typed in `socialai play`; then no other agent plays.
         episode: which one, as for `reset_of`: `seed`, `index`, `test_episode`, `layout`.
 
@@ -150,10 +155,15 @@ class EpisodeTracer:
         UsageError: the agent cannot play this.
     """
 
-    def __init__(self, scenario: str, agent: str | None, lines: Sequence[str] | None, seed: int) -> None:
-        self.agent = "typed" if agent is None else named_agent(agent, scenario)
-        self._asked, self._lines, self._seed = scenario, lines, seed
-        if lines is None and agent in (None, "oracle"):
+    def __init__(self, scenario: str, agent: Agent | None, lines: Sequence[str] | None, seed: int) -> None:
+        if agent is not None and lines is not None:
+            raise UsageError("agent: got one, but `do` says what is done; leave one of them out")
+        self._player = None if agent is None else player_of(agent, scenario)
+        self.agent = "typed" if self._player is None else self._player.agent
+        self._asked, self._lines = scenario, lines
+        self._seed = agent.seed if isinstance(agent, Player) else seed
+        own = self._player is not None and self._player.policy is not None
+        if lines is None and not own and self.agent in ("typed", "oracle"):
             try:
                 scenario = with_script(scenario).name
                 self.agent = "oracle"
@@ -250,14 +260,24 @@ class EpisodeTracer:
         if self._lines is not None:
             typed = iter([self._typed(line) for line in self._lines])
             return lambda observation: next(typed, None)
-        if self.agent == "oracle":
+        own = self._player is not None and self._player.policy is not None
+        if self.agent == "oracle" and not own:
             return lambda observation: env.scripted_action()
-        if self.agent == "random":
+        if self.agent == "random" and not own:
             generator, sizes = np.random.default_rng(self._seed), env.action_space.nvec
             return lambda observation: generator.integers(0, sizes, dtype=np.int64)
         policy = self._policy()
         policy.reset(np.ones(1, np.bool_))
-        return lambda observation: policy.act(observation)
+
+        def act(observation: Any) -> NDArray[np.int64]:
+            actions = np.asarray(policy.act({name: value[None] for name, value in observation.items()}))
+            shape = (1, len(env.action_space.nvec))
+            if actions.shape != shape:
+                raise UsageError(f"agent: got actions of the shape {actions.shape}, expected {shape}")
+            chosen: NDArray[np.int64] = actions[0]
+            return chosen
+
+        return act
 
     def _typed(self, line: str) -> NDArray[np.int64]:
         env = self._env.unwrapped
@@ -269,9 +289,11 @@ class EpisodeTracer:
         return action
 
     def _policy(self) -> Any:
-        require_trainer()
+        assert self._player is not None, "internal: what nobody named is random or the script"
+        if self._player.is_trained:
+            require_trainer()
         try:
-            policy, told = make_policy(Player(self.agent, seed=self._seed), self._env)
+            policy, told = make_policy(replace(self._player, seed=self._seed), self._env)
         except ValueError as error:
             raise UsageError(f"{self.scenario}: {error}") from error
         for warning in told:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
+from reprlib import repr
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
 TRANSCRIPTS: Final = "transcripts"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _SECONDS_BETWEEN_LINES: Final = 5.0
+_MOST_SPENT: Final = 1e12
 _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
 
 
@@ -183,8 +185,8 @@ def _prices(text: str | None) -> tuple[float, float] | None:
         prompt, completion = (float(part) for part in text.split(","))
     except ValueError:
         prompt = completion = -1.0
-    if not (prompt >= 0 and completion >= 0):
-        raise UsageError(f"--prices: got {text!r}, expected two amounts such as 0.15,0.60")
+    if not (0 <= prompt <= _MOST_SPENT and 0 <= completion <= _MOST_SPENT):
+        raise UsageError(f"--prices: got {repr(text)}, expected two amounts such as 0.15,0.60")
     return prompt, completion
 
 
@@ -194,9 +196,12 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
     if text is None:
         return Budget()
     match = _BUDGET.fullmatch(text.strip())
-    if match is None:
-        raise UsageError(f"--budget: got {text!r}, expected an amount such as 200000 or 2.50usd")
-    amount = float(match[1].replace(",", "").replace("_", ""))
+    amount = 0.0 if match is None else float(match[1].replace(",", "").replace("_", ""))
+    if match is None or not 0 < amount <= _MOST_SPENT:
+        raise UsageError(
+            f"--budget: got {repr(text)}, expected an amount such as 200000 or 2.50usd, above 0 and at most "
+            f"{_MOST_SPENT:g}"
+        )
     if (match[2] or "").lower() != "usd":
         return Budget(tokens=int(amount))
     if prices is None:

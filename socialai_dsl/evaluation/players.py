@@ -1,19 +1,28 @@
 """Players: random actions, a script, a person, a language model or a trained network."""
 
 import re
+import secrets
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 import socialai_dsl
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.episodes import Policy, RandomPolicy, ScriptedPolicy
+from socialai_dsl.evaluation.episodes import Observation, Policy, RandomPolicy, ScriptedPolicy
 from socialai_dsl.loader.reader import shipped_folder
 from trainer.shipped import PREFIX, located, shipped_agents
 
 MODEL_PREFIX: Final = "llm:"
+UNTRAINED: Final = ("random", "oracle", "human")
+HUMAN_FOLDER: Final = Path("runs", "human")
+"""Where the sessions of people go unless the user says otherwise."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +68,18 @@ class Player:
 
     Attributes:
         agent: `random`, `oracle`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
-            checkpoints or of one.
+            checkpoints or of one; of a policy of one's own what it is called.
         device: where a network runs.
         greedy: whether a network takes its most probable action instead of sampling.
         seed: of what a network or `random` draws; rooms do not depend on it.
         net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
         folder: where the file of such a network is looked for first.
-        out, options: where the transcripts of a language model go, and how it is asked.
+        out: where what a person or a language model plays is kept, by default in `runs`.
+        options: how a language model is asked.
+        policy: a policy of one's own, which plays.
+
+    Raises:
+        ValueError: the agent is neither a name nor a path.
     """
 
     agent: str
@@ -74,13 +88,40 @@ class Player:
     seed: int = 0
     net: str | None = None
     folder: Path = Path()
-    out: Path = Path()
+    out: Path | None = None
     options: ModelOptions | None = None
+    policy: Policy | None = None
+
+    def __post_init__(self) -> None:
+        agent: object = self.agent  # whatever the caller gives
+        if isinstance(agent, Path):
+            object.__setattr__(self, "agent", str(agent))
+        elif not isinstance(agent, str):
+            raise ValueError(
+                f"agent: got {self.agent!r}, expected a name or a path; a policy plays by `policy`"
+            )
+        if self.is_model and self.options is None:
+            object.__setattr__(self, "options", ModelOptions())
+
+    @property
+    def is_model(self) -> bool:
+        """Whether a language model plays."""
+        return self.policy is None and self.agent.startswith(MODEL_PREFIX)
+
+    @property
+    def is_script(self) -> bool:
+        """Whether the scenario's own script plays."""
+        return self.policy is None and self.agent == "oracle"
 
     @property
     def is_trained(self) -> bool:
-        """Whether a network plays."""
-        return self.agent not in ("random", "oracle", "human") and not self.agent.startswith(MODEL_PREFIX)
+        """Whether a network plays whose checkpoint `agent` names."""
+        return self.policy is None and self.agent not in UNTRAINED and not self.is_model
+
+    @property
+    def kept_in(self) -> Path:
+        """Where what a person or a language model plays is kept."""
+        return self.out or (default_folder(self.agent) if self.is_model else session_folder(HUMAN_FOLDER))
 
     @property
     def manner(self) -> str:
@@ -89,7 +130,7 @@ class Player:
             history = self.options.history
             shown = "the whole episode" if history is None else f"{history} observation{'s' * (history > 1)}"
             return f"{self.options.style} and {self.options.mode}, {shown}"
-        if self.agent in ("oracle", "human"):
+        if self.agent in ("oracle", "human") or self.policy is not None:
             return ""
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
 
@@ -98,8 +139,16 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
     """What plays, and what is to be known about it, such as that it was trained on something else.
 
     Raises:
+        UsageError: a person or a language model plays, who cannot be asked here.
         ValueError: the checkpoint does not fit the environments.
     """
+    if player.policy is not None:
+        return player.policy, []
+    if player.agent == "human" or player.is_model:
+        raise UsageError(
+            f"the agent {player.agent!r} plays for `socialai evaluate` alone; expected random, oracle, shipped, a "
+            "checkpoint or a run folder"
+        )
     if player.agent == "random":
         return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
     if player.agent == "oracle":
@@ -112,6 +161,48 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
             player.agent, envs, player.greedy, player.seed, player.device, player.net, player.folder
         )
     return policy, [str(warning.message) for warning in caught]
+
+
+def player_of(agent: "str | Path | Player | Policy | Callable[[Any], Any]", scenario: str) -> Player:
+    """Who is meant by an agent: a name, a path, a `Player`, an object with `reset` and `act`, or a function.
+
+    Args:
+        agent: a function is called with the observations of several environments, and returns int64 (E, heads).
+        scenario: for which `shipped` is looked up.
+
+    Raises:
+        ScenarioError, UsageError: see `named_agent`.
+        ValueError: it is none of these.
+    """
+    if isinstance(agent, Player):
+        return agent
+    if isinstance(agent, str | Path):
+        return Player(named_agent(str(agent), scenario))
+    if isinstance(agent, type):
+        raise ValueError(f"agent: got the class {agent.__name__}, expected an object of it")
+    name = getattr(agent, "__name__", type(agent).__name__)
+    if all(callable(getattr(agent, method, None)) for method in ("reset", "act")):
+        return Player(name, policy=agent)  # type: ignore[arg-type]
+    if callable(agent):
+        return Player(name, policy=_FunctionPolicy(agent))
+    raise ValueError(
+        f"agent: got {agent!r}, expected a name, a path, a Player, an object with the methods reset and act, or a "
+        "function"
+    )
+
+
+class _FunctionPolicy:
+    """A function that remembers nothing, as a policy."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self._function = function
+
+    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: Observation) -> NDArray[np.int64]:
+        """See `Policy.act`."""
+        return np.asarray(self._function(observation))
 
 
 def require_trainer() -> None:
@@ -171,6 +262,12 @@ def named_agent(agent: str, scenario: str) -> str:
             if name in known:
                 return PREFIX + name
     raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
+
+
+def session_folder(parent: Path, participant: str | None = None) -> Path:
+    """A folder that no other session has, named after the person, if there is a name, and the time in UTC."""
+    stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
+    return parent / (stamp if participant is None else f"{participant}-{stamp}")
 
 
 def default_folder(agent: str) -> Path:

@@ -6,10 +6,26 @@ from pathlib import Path
 
 from socialai_dsl.evaluation.testing import Evaluation
 from socialai_dsl.replay.page import replay_page
-from socialai_dsl.run_folder import EPISODES, REPLAY, scenario_folder_name, write_text
+from socialai_dsl.run_folder import EPISODES, REPLAY, only_writer, scenario_folder_name, write_text
 
 
 def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
+    """`write_recordings` as the only writer of the folder.
+
+    Raises:
+        UsageError: another process writes there.
+        ValueError: it is none of `evaluate_agent`'s.
+        OSError: a file cannot be written.
+    """
+    if not isinstance(evaluation, Evaluation):
+        raise ValueError(
+            f"evaluation: got an {type(evaluation).__name__}, expected what `evaluate_agent` returns"
+        )
+    with only_writer(folder):
+        return write_recordings(evaluation, folder, count, label)
+
+
+def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
     """Record up to `count` successes and as many failures, a page with them included, and list all episodes.
 
     Args:

@@ -1,32 +1,36 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import socialai_dsl
+from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.episodes import EvalResult, Policy, evaluate
-from socialai_dsl.evaluation.export import SCENARIO
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
-from socialai_dsl.evaluation.players import Player, folder_of, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.players import Player, folder_of, make_policy, player_of, require_trainer
 from socialai_dsl.evaluation.scripts import with_script
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 from socialai_dsl.replay import Thought, Trace, trace_of
 from socialai_dsl.replay.document import Outcome
-from socialai_dsl.replay.endings import Ending, endings_of
+from socialai_dsl.replay.endings import Ending, endings_of, short_name
 from socialai_dsl.replay.film import RecordedEpisode, record
 from socialai_dsl.replay.tracing import Think
-from socialai_dsl.run_folder import SETTINGS, read_json
+from socialai_dsl.run_folder import SETTINGS, read_json, scenario_folder_name
+from trainer.config import scenario_in
+
+if TYPE_CHECKING:  # it needs Textual
+    from socialai_dsl.play.game import FinishedEpisode
 
 # Test episodes played together: enough to be fast, and no result depends on it.
 _TOGETHER: Final = 125
@@ -75,7 +79,7 @@ class Evaluation:
             "rules": dict(result.rules),
         }
         figures |= {**_by_member(self.program, shares), **self.more}
-        if self.player.agent == "oracle":
+        if self.player.is_script:
             # A room that the script does not solve is worth looking at: it can be played again by its number.
             figures["unsolved"] = (~result.success).nonzero()[0].tolist()
         return figures
@@ -102,7 +106,7 @@ class Evaluation:
             label: how the recording calls the agent.
         """
         env = socialai_dsl.make(self.program, render_mode="rgb_array")
-        title = f"{self.scenario}, test episode {number}, {label}"
+        title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
             return record(
@@ -161,12 +165,15 @@ def _thinking(policy: Any, number: int) -> Think:
     return think
 
 
-def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> Evaluation:
+def evaluate_agent(
+    agent: str | Path | Player | Policy | Callable[[Any], Any], scenario: str, episodes: int = 500
+) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
     Args:
-        agent: `random`, `oracle` (the scenario's own script), `human`, `shipped`, `shipped:NAME`, or the path of a run
-            or of a checkpoint; as a `Player` with a device, a seed and the like, and for `llm:MODEL` with its options.
+        agent: `random`, `oracle` (the scenario's own script), `human`, `llm:MODEL`, `shipped`, `shipped:NAME`, or the
+            path of a run or of a checkpoint; as a `Player` with a device, a seed, options and the like; or a policy of
+            your own, see `Policy`, or a function from observations to actions.
         scenario: a path or a name, with `+variants` and `?parameters`.
         episodes: how many. Rooms are the same for every agent, on every machine.
 
@@ -174,8 +181,11 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
         ScenarioError: the scenario has mistakes.
         UsageError: the checkpoint or the script does not fit it, or a language model does not answer.
         RunFailed: a language model has spent its budget.
+        ValueError: an argument is not what is expected.
     """
-    player = agent if isinstance(agent, Player) else Player(named_agent(agent, scenario))
+    if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
+        raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
+    player = player_of(agent, scenario)
     loaded = socialai_dsl.load(scenario)
     return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
 
@@ -185,18 +195,19 @@ def play_test_set(
 ) -> Evaluation:
     """`evaluate_agent` of a scenario that is loaded and compiled."""
     endings = endings_of(loaded, program)
-    if player.agent == "human":
-        result, actions = _let_a_person_play(scenario, program, episodes)
-        return Evaluation(scenario, loaded, program, player, result, endings, actions)
-    if player.options is not None:
+    if player.agent == "human" and player.policy is None:
+        person = _let_a_person_play(player.kept_in, scenario, program, episodes)
+        return _of_person(person, scenario, loaded, program, player)
+    if player.is_model:
+        assert player.options is not None, "internal: a language model has options"
         played = let_a_model_play(
-            player.agent, scenario, loaded, program, episodes, player.out, player.options
+            player.agent, scenario, loaded, program, episodes, player.kept_in, player.options
         )
         return _of_model(played, scenario, loaded, program, player)
     if player.is_trained:
         require_trainer()
     envs = socialai_dsl.make_vec(
-        compiled(with_script(scenario, loaded).loaded) if player.agent == "oracle" else program,
+        compiled(with_script(scenario, loaded).loaded) if player.is_script else program,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
         autoreset_mode="Disabled",
@@ -268,16 +279,45 @@ class _Remembering:
 
 
 def _let_a_person_play(
-    scenario: str, program: Playable, episodes: int
-) -> tuple[EvalResult, dict[int, list[NDArray[np.int64]]]]:
-    """Let a person play test episodes until they quit."""
+    session: Path, scenario: str, program: Playable, episodes: int
+) -> "list[FinishedEpisode]":
+    """Let a person play test episodes until they quit, and keep everything in the session's folder."""
     from socialai_dsl.play import play
 
+    name = scenario_folder_name(scenario)
+    about = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
+
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
-        title = f"{scenario}, test episode {number}"
+        title = f"{name}, test episode {number}"
         return (title, {"options": {"test_episode": number}}) if number < episodes else None
 
-    played = play(scenario, episode, practice=False)
+    return play(scenario, episode, session / name, about, practice=False)
+
+
+def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
+    """The first test episodes that a person has played, as the journal in the folder `run` keeps them.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: the folder holds no episode of this scenario that was played to its end.
+    """
+    from socialai_dsl.play.game import finished_episodes
+    from socialai_dsl.play.journal import FILE, read_journal
+
+    loaded = socialai_dsl.load(scenario)
+    program = socialai_dsl.compile(loaded)
+    try:
+        about, played = read_journal(run / FILE)[0], finished_episodes(run / FILE)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UsageError(f"{run}: holds no session of a person ({error})") from None
+    if about.get("program_sha256") != program.sha256:
+        raise UsageError(f"{run} holds episodes of another version of the scenario")
+    return _of_person(played[:most], scenario, loaded, program, Player("human", out=run.parent))
+
+
+def _of_person(
+    played: "Sequence[FinishedEpisode]", scenario: str, loaded: Loaded, program: Playable, player: Player
+) -> Evaluation:
     if not played:
         raise UsageError("no episode was played to its end")
     names = tuple(program.outcomes)
@@ -288,7 +328,8 @@ def _let_a_person_play(
         np.array([p.reward for p in played]),
         names,
     )
-    return result, {number: p.actions for number, p in enumerate(played)}
+    actions = {number: p.actions for number, p in enumerate(played)}
+    return Evaluation(scenario, loaded, program, player, result, endings_of(loaded, program), actions)
 
 
 def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]:
@@ -317,9 +358,4 @@ def own_scenario(agent: str) -> str:
     scenario = read_json(run / SETTINGS).get("scenario")
     if not isinstance(scenario, str):
         raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")
-    return str(run / scenario) if _comes_along(run, scenario) else scenario
-
-
-def _comes_along(run: Path, scenario: str) -> bool:
-    """Whether the scenario's file lies in the folder itself, as in an exported one."""
-    return scenario.startswith(f"{SCENARIO}/") and (run / SCENARIO).is_dir()
+    return scenario_in(run, scenario)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.experiments.engines import Engine, Handle
-from socialai_dsl.experiments.folder import Run, UnreadableError, is_locked, said_of
+from socialai_dsl.experiments.folder import Run, UnreadableError, said_of, worker_of
 from socialai_dsl.experiments.work import End, Outcome, finished
 
 SECONDS_BETWEEN_LOOKS: Final = 0.2
@@ -57,7 +57,7 @@ def drive(
 def _known(run: Run) -> End | None:
     """What came of a run, or that another command works on it; None if it is to be given to the engine."""
     try:
-        return finished(run) or ((Outcome.HELD, "") if is_locked(run.path) else None)
+        return finished(run) or ((Outcome.HELD, "") if worker_of(run.path) is not None else None)
     except (OSError, UnreadableError) as error:
         return Outcome.FAILED, said_of(error)
 

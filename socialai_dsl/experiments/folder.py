@@ -9,13 +9,13 @@ import os
 import socket
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from filelock import FileLock
-
 from socialai_dsl.atomic import write_text
+from socialai_dsl.folder_lock import Holder, hold, holder
 
 EXPERIMENT: Final = "experiment.json"
 RUNS: Final = "runs"
@@ -27,8 +27,9 @@ TESTS: Final = "tests.json"
 METRICS: Final = "metrics.jsonl"
 CHECKPOINTS: Final = "checkpoints"
 CANCEL: Final = "cancel"
-LOCK: Final = "worker.lock"
-"""Locked by the one process that works on a run; the system unlocks it when that process dies, however it dies."""
+_WORKER: Final = "worker"
+"""The lock of the one process that works on a run, see `folder_lock`."""
+LOCK: Final = f"{_WORKER}.lock"
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
 
@@ -139,20 +140,20 @@ class Run:
         """The status for people: a run whose worker is gone is waiting, one that cannot be read has failed."""
         try:
             status = self.status()
-            if status.state == "running" and not is_locked(self.path):
+            if status.state == "running" and worker_of(self.path) is None:
                 status.end("its process is gone", self.last_sign())
                 status.state = "waiting"
         except (OSError, UnreadableError) as error:
             return Status("failed", message=f"cannot be read: {said_of(error)}")
         return status
 
-    def lock(self) -> FileLock:
+    def lock(self) -> AbstractContextManager[None]:
         """To be held while working on it.
 
         Raises:
-            Timeout: on entry, if another worker holds it.
+            HeldError: on entry, if another worker holds it.
         """
-        return FileLock(self.path / LOCK, timeout=0)
+        return hold(self.path, _WORKER)
 
     # -- what a process left ---------------------------------------------------------------------------------
 
@@ -219,16 +220,9 @@ class Run:
         return (self.path / CANCEL).exists()
 
 
-def is_locked(run: Path) -> bool:
-    """Whether a process works on the run in this folder."""
-    path = run / LOCK
-    if not path.exists():
-        return False
-    try:
-        with FileLock(path, timeout=0):
-            return False
-    except OSError:  # among them `Timeout`; or the folder is one that only its worker may write to
-        return True
+def worker_of(run: Path) -> Holder | None:
+    """The process that works on the run in this folder; None if there is none."""
+    return holder(run, _WORKER)
 
 
 def said_of(error: Exception) -> str:

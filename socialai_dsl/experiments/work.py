@@ -14,8 +14,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Final
 
-from filelock import Timeout
-
 from socialai_dsl.atomic import write_json
 from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.folder import (
@@ -30,9 +28,11 @@ from socialai_dsl.experiments.folder import (
     runs_of,
     said_of,
 )
+from socialai_dsl.folder_lock import HeldError
 
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
+_WITHOUT_NETWORK: Final = ("random", "oracle")
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
 _SECONDS_TO_SAVE: Final = 10.0
 """How long a process that is ended may take to save its checkpoint."""
@@ -128,7 +128,7 @@ def _settle(run: Run, state: State) -> bool:
             status.end("its process was gone", run.last_sign())
             status.state, status.message = state, None
             run.write_status(status)
-    except Timeout:
+    except HeldError:
         return False
     return True
 
@@ -139,7 +139,7 @@ def _performed_alone(run: Run, stop: Stop) -> End:
         with run.lock():
             # It may have come to its end, or been given up, just before it was ours.
             return finished(run) or _Work(run, stop).perform()
-    except Timeout:
+    except HeldError:
         return Outcome.HELD, ""
 
 
@@ -228,7 +228,8 @@ class _Work:
         if condition["frames"] is not None:
             command += ["--frames", str(condition["frames"])]
         for key, value in condition["options"].items():
-            command += typed(key, value)
+            if key != "device" or condition["agent"] not in _WITHOUT_NETWORK:
+                command += typed(key, value)
         return [*command, "--out", str(path), "--json"]
 
     def _test_command(self, scenarios: Sequence[str]) -> list[str]:
@@ -239,10 +240,10 @@ class _Work:
             agent,
             "--episodes",
             str(options["eval_episodes"]),
-            "--device",
-            options["device"],
         ]
-        if condition["agent"] != "ppo":
+        if agent not in _WITHOUT_NETWORK:
+            command += ["--device", options["device"]]
+        if agent not in ("oracle", str(self._run.path)):
             command += ["--seed", str(self._run.seed)]
         if ":" in str(options.get("net", "")):
             command += ["--net", options["net"]]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import secrets
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from datetime import UTC, datetime
 from itertools import count, islice, takewhile
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -15,6 +18,7 @@ import httpx
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
@@ -29,6 +33,8 @@ from socialai_dsl.program_suite import Playable
 FORMAT: Final = "socialai-transcript/2"
 Probing = Literal["apart", "kept", "off"]
 _SETTINGS: Final = "settings.json"
+_SESSION: Final = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
+"""This process, in every reply that it writes down."""
 _SHOWN: Final = 4000
 """The most characters of a reply that the model is shown again, the last ones without its thoughts."""
 
@@ -136,7 +142,7 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
         if other:
             raise OtherSettings(f"{folder} holds episodes that were played with another {', '.join(other)}")
     else:
-        path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_json(path, content)
     return lambda number: _transcript(folder, number)
 
 
@@ -355,9 +361,12 @@ class Conversation:
         record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
         record |= {"reasoning_tokens": usage.reasoning} if usage.reasoning else {}
         record |= {"estimated": True} if usage.estimated else {}
+        record |= {"session": _SESSION, "time": datetime.now(UTC).isoformat(timespec="milliseconds")}
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with open(self._path, "a", encoding="utf-8") as file:
             file.write(json.dumps(record, ensure_ascii=False) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
         self._take(record)
 
     def played(self) -> PlayedEpisode:
@@ -462,8 +471,10 @@ def _is_json(line: bytes) -> bool:
 
 
 def _mend(path: Path) -> None:
-    """Drop what follows a line that was cut off."""
+    """Move what follows a line that was cut off to a file beside the transcript."""
     kept = sum(len(line) + 1 for line in _whole_lines(path))
     if path.exists() and path.stat().st_size > kept:
-        with open(path, "r+b") as file:
+        with open(path, "r+b") as file, open(path.with_suffix(".cut"), "ab") as rest:
+            file.seek(kept)
+            rest.write(file.read() + b"\n")
             file.truncate(kept)

@@ -2,7 +2,10 @@
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from socialai_dsl.errors import UsageError
 
@@ -13,32 +16,45 @@ if TYPE_CHECKING:
 __all__ = ["play"]
 
 
-def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[FinishedEpisode]":
+def play(
+    scenario: str,
+    episodes: "Episodes",
+    folder: Path,
+    about: Mapping[str, Any] = MappingProxyType({}),
+    practice: bool = True,
+) -> "list[FinishedEpisode]":
     """Let a person at the terminal play; the episodes that were played to their end.
+
+    Everything is in `folder/played.jsonl` before it is shown, so it survives whatever ends the process.
 
     Args:
         scenario: a path or a name.
         episodes: which ones.
+        folder: is made, and holds no other session.
+        about: what the file says of the session.
         practice: whether steps may be taken back and the like.
 
     Raises:
         ScenarioError: the scenario has mistakes.
         UsageError: there is no terminal.
+        OSError: the file cannot be written, or is there already.
     """
     _require_terminal()
     from socialai_dsl.play.game import Game
+    from socialai_dsl.play.journal import FILE, Journal
     from socialai_dsl.play.screen import PlayApp
 
     game = Game(scenario)
     try:
-        first = episodes(0)
-        assert first is not None, "internal: there is at least one episode to play"
-        game.begin(*first)
-        app = PlayApp(game, episodes, practice)
-        done = app.run() or []
-        if app.failure is not None:
-            raise app.failure
-        return done
+        with Journal(folder / FILE, {**about, "practice": practice}) as game.journal:
+            first = episodes(0)
+            assert first is not None, "internal: there is at least one episode to play"
+            game.begin(*first)
+            app = PlayApp(game, episodes, practice)
+            done = app.run() or []
+            if app.failure is not None:
+                raise app.failure
+            return done
     finally:
         game.close()
 

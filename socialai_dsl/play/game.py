@@ -1,6 +1,7 @@
 """A person's game: the episode so far, its dialogue, and every step back to its start."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +11,7 @@ import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.envs.typed import Phrases
 from socialai_dsl.envs.view import View
+from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending, endings_of
@@ -81,12 +83,36 @@ class FinishedEpisode:
         return f"{self.title}: {verdict} ({self.ended.text}) after {steps} steps, reward {self.reward:.3f}"
 
 
+def finished_episodes(file: Path) -> list[FinishedEpisode]:
+    """The episodes of a session that were played to their end, from its journal.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is no journal.
+    """
+    played: list[FinishedEpisode] = []
+    title, actions = "", list[NDArray[np.int64]]()
+    for event in read_journal(file):
+        match event["event"]:
+            case "episode":
+                title, actions = event["title"], []
+            case "step":
+                actions.append(np.array(event["action"], np.int64))
+            case "undo":
+                del actions[event["t"] :]
+            case "end":
+                ended = EpisodeEnd(event["outcome"], event["success"], event["text"])
+                played.append(FinishedEpisode(title, list(actions), event["reward"], ended))
+    return played
+
+
 class Game:
     """One environment, and everything that happened in it since the reset.
 
     Attributes:
         title: which episode is played.
         phrases: what can be done and said.
+        journal: gets everything that is played, before it is shown; None keeps nothing.
 
     Args:
         scenario: a path or a name.
@@ -103,6 +129,7 @@ class Game:
         self._about = _abouts(loaded, self._program)
         self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
+        self.journal: Journal | None = None
         self._moments: list[GameMoment] = []
 
     def begin(self, title: str, reset: dict[str, Any]) -> None:
@@ -114,6 +141,7 @@ class Game:
         observation, info = self._env.reset(**reset)
         self.title = title
         self._moments = [GameMoment(self._env.snapshot(), observation["image"], info.get("member"))]
+        self._note("episode", title=title, reset=reset, member=info.get("member"))
 
     def act(self, movement: str | None, sentence: str | None) -> None:
         """Play a step.
@@ -136,6 +164,11 @@ class Game:
                 self._ended(info) if terminated or truncated else None,
             )
         )
+        self._note(
+            "step", t=self.steps, action=action.tolist(), did=movement, said=sentence, reward=float(reward)
+        )
+        if (ended := self.now.ended) is not None:
+            self._note("end", **vars(ended), steps=self.steps, reward=self.now.reward)
 
     def undo(self) -> bool:
         """Take the last step back, chance included; whether there was one."""
@@ -143,6 +176,7 @@ class Game:
             return False
         self._moments.pop()
         self._env.restore(self.now.snapshot)
+        self._note("undo", t=self.steps)
         return True
 
     @property
@@ -202,6 +236,10 @@ class Game:
     def close(self) -> None:
         """Let the environment go."""
         self._env.close()
+
+    def _note(self, event: str, **more: Any) -> None:
+        if self.journal is not None:
+            self.journal.note(event, **more)
 
     def _ended(self, info: dict[str, Any]) -> EpisodeEnd:
         name = outcome_name(info)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from socialai_dsl.replay.endings import short_file, short_name
 from socialai_dsl.replay.page import replay_page
 
 FORMAT: Final = "socialai-trace/1"
@@ -207,6 +208,12 @@ class Trace(_Part):
         ended = self.moments[-1].ended
         return ended is not None and ended.success
 
+    def portable(self) -> Trace:
+        """The same without the folders of this machine: files are called as `short_file` calls them."""
+        rules = [rule.model_copy(update={"at": _short_place(rule.at)}) for rule in self.rules]
+        names = {"scenario": short_name(self.scenario), "agent": short_name(self.agent)}
+        return self.model_copy(update={**names, "rules": rules})
+
     def as_json(self) -> str:
         """The trace as one line of JSON, which leaves out values that are defaults."""
         return self.model_dump_json(exclude_defaults=True)[:-1] + f',"format":"{FORMAT}"}}'
@@ -215,6 +222,11 @@ class Trace(_Part):
         """The episode as a notebook shows it: a frame that holds the page of a replay."""
         page = escape(replay_page([self]))
         return f'<iframe title="an episode" style="width: 100%; height: 760px; border: 0" srcdoc="{page}"></iframe>'
+
+
+def _short_place(place: str) -> str:
+    file, colon, line = place.rpartition(":")
+    return short_file(file) + colon + line
 
 
 def trace_schema() -> dict[str, Any]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.source import Source
 
@@ -66,13 +66,24 @@ def _ending(outcome: Any, sources: Mapping[str, Source]) -> Ending:
     line = sources[outcome.span.file].line(outcome.span.line).strip().removeprefix("- ").lstrip()
     if line.startswith("{") and line.endswith("}"):
         line = line[1:-1].strip()
-    return Ending(outcome.name, outcome.success, prefix + line, _short(outcome.span.file), outcome.span.line)
+    return Ending(
+        outcome.name, outcome.success, prefix + line, short_file(outcome.span.file), outcome.span.line
+    )
 
 
-def _short(file: str) -> str:
-    """A file's name without the folder in which the package lies, so that results are alike on all machines."""
+def short_file(file: str) -> str:
+    """A file's name without folders of this machine: `scenarios/...` for what ships, relative, or the name alone."""
     path, shipped = Path(file).resolve(), shipped_folder().resolve()
-    return f"scenarios/{path.relative_to(shipped).as_posix()}" if path.is_relative_to(shipped) else file
+    if path.is_relative_to(shipped):
+        return f"scenarios/{path.relative_to(shipped).as_posix()}"
+    return Path(file).name if Path(file).is_absolute() else file
+
+
+def short_name(spec: str) -> str:
+    """What people call a scenario or an agent: of a file its name, of a folder of this machine the last part."""
+    path, mark, parameters = spec.partition("?")
+    is_file = path.partition("+")[0].endswith(SUFFIXES)
+    return (Path(path).name if is_file or Path(path).is_absolute() else path) + mark + parameters
 
 
 def _sources(loaded: Loaded) -> dict[str, Source]:

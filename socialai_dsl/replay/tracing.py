@@ -78,7 +78,7 @@ def trace_of(
     else:
         if cut_short is not None:
             tracer.cut_short(next(answers), cut_short)
-    return tracer.trace()
+    return tracer.trace().portable()
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from socialai_dsl.experiments.folder import (
     RUNS,
     STATUS,
     TESTS,
-    is_locked,
+    worker_of,
 )
 from socialai_dsl.reporting.records import (
     ConditionEntry,
@@ -40,7 +40,7 @@ from socialai_dsl.reporting.records import (
     described,
 )
 from socialai_dsl.reporting.seeds import read_updates
-from trainer.config import HYPER, RunConfig, configure
+from trainer.config import HYPER, SCENARIO_FOLDER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
 
@@ -174,7 +174,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     Raises:
         ValueError: a folder is not that of a run.
     """
-    grouped: dict[tuple[str, str], list[tuple[dict[str, Any], Run]]] = {}
+    grouped: dict[tuple[str, str, str], list[tuple[dict[str, Any], Run]]] = {}
     called = [folder.name for folder in folders]
     for folder in folders:
         settings = _settings(folder, [])
@@ -183,16 +183,20 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         seed = settings.get("seed")
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
-        grouped.setdefault((str(settings["scenario"]), _column(settings)), []).append((settings, run))
+        key = str(settings["scenario"]), _scenario_digest(folder), _column(settings)
+        grouped.setdefault(key, []).append((settings, run))
     conditions = []
-    for (scenario, column), members in grouped.items():
-        settings = members[0][0]
+    for (scenario, digest, column), members in grouped.items():
+        settings, first = members[0]
+        row = scenario.removeprefix(f"{SCENARIO_FOLDER}/")
+        if sum(key[::2] == (scenario, column) for key in grouped) > 1:
+            row += f" ({digest[:6]})"  # another file of the same name
         frames = settings.get("frames")
         entry = ConditionEntry(
-            name=f"{scenario} / {column}",
-            row=scenario,
+            name=f"{row} / {column}",
+            row=row,
             column=column,
-            scenario=scenario,
+            scenario=scenario_in(first.folder, scenario),
             agent=str(settings.get("agent", "ppo")),
             frames=frames if isinstance(frames, int) and frames > 0 else None,
             tests=sorted({test for _, run in members for test in run.tests}),
@@ -202,6 +206,14 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         )
     names = f"{len(folders)} runs" if len(folders) != 1 else "one run"
     return Experiment(names, "", "Runs that were given one by one.", "", tuple(conditions))
+
+
+def _scenario_digest(folder: Path) -> str:
+    """Of the scenario's files that the folder keeps, which tells scenarios apart whose files have one name."""
+    digest = hashlib.sha256()
+    for file in sorted((folder / SCENARIO_FOLDER).rglob("*.y*ml")):
+        digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def _column(settings: Mapping[str, Any]) -> str:
@@ -253,7 +265,7 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
 def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
     """What the status says, unless whoever wrote it is gone; without a status, what the files tell."""
     if status is not None:
-        is_left = status.state == "running" and (folder / LOCK).exists() and not is_locked(folder)
+        is_left = status.state == "running" and (folder / LOCK).exists() and worker_of(folder) is None
         return "stopped" if is_left else status.state
     if result is not None:
         return "done"

@@ -18,7 +18,7 @@ from pydantic import (
 from socialai_dsl.errors import first_mistake
 from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many
 from socialai_dsl.schema.suite import MemberName
-from trainer.config import FLAGS, HYPER, RunConfig
+from trainer.config import FLAGS, HYPER, MOST_FRAMES, RunConfig
 
 Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""
@@ -111,11 +111,11 @@ class Settings(_RunOptions):
         None,
         description="ppo (default), random, oracle, shipped:NAME, or a checkpoint or run folder, relative to this file",
     )
-    frames: int | None = Field(None, ge=1, description="frames to train for")
+    frames: int | None = Field(None, ge=1, le=MOST_FRAMES, description="frames to train for")
     seeds: (
         Annotated[int, Field(ge=1, le=10_000)]
         | Annotated[
-            ListOf[Annotated[int, Field(ge=0)]],
+            ListOf[Annotated[int, Field(ge=0, lt=2**63)]],
             Field(min_length=1, max_length=10_000),
         ]
         | None

@@ -202,7 +202,7 @@ class Session:
     def replay(self) -> Reply:
         """The episode so far as a page of its own."""
         _, tracer = self._playing()
-        return {"page": replay_page([tracer.trace()])}
+        return {"page": replay_page([tracer.trace().portable()])}
 
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
         """What `socialai check` says of a text."""

@@ -73,6 +73,23 @@ def test_only_the_newest_are_kept_and_leftovers_swept(keep: int, session: Sessio
     assert read(tmp_path).meta.update == 3
 
 
+@pytest.mark.parametrize("keep", [1, 2])
+def test_what_was_just_written_stays_beside_a_damaged_newer_file(
+    keep: int, session: Session, tmp_path: Path
+) -> None:
+    newer = [tmp_path / f"{frames:015d}.safetensors" for frames in (500, 10**14)]
+    for file in newer:
+        file.write_bytes(b"cut")
+    for number in range(3):
+        session.update = number
+        path = write(tmp_path, session.checkpoint(), keep)
+        with pytest.warns(UserWarning, match=f"using {path.name} instead"):
+            assert read(tmp_path).meta.frames == session.frames
+    assert len(list(tmp_path.iterdir())) == keep + len(newer)
+    with pytest.raises(ValueError, match="keep: got 0"):
+        write(tmp_path, session.checkpoint(), 0)
+
+
 def test_a_write_is_synced_before_it_is_renamed(
     session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

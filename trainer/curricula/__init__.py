@@ -22,7 +22,7 @@ SHIPPED = ("even", "expert", "ladder", "progress", "reverse")
 def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curriculum:
     """The curriculum of a name: one of `SHIPPED`, a YAML file of phases, or `mine:Curriculum`.
 
-    A class of the user's, looked for in `folder` first, is built as `Curriculum(leaves)`.
+    Files are looked for in `folder` first. A class of the user's is built as `Curriculum(leaves)`.
 
     Raises:
         ValueError: there is no such curriculum, or it does not fit the suite.
@@ -33,6 +33,7 @@ def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curric
     if name in SHIPPED:
         return Phases(load_curriculum(Path(__file__).with_name(f"{name}.yaml")), leaves)
     if name.endswith((".yaml", ".yml")):
-        return Phases(load_curriculum(name), leaves)
+        beside = folder / name
+        return Phases(load_curriculum(str(beside) if beside.is_file() else name), leaves)
     made: Curriculum = load_class(name, "curriculum", (*SHIPPED, "a .yaml file"), Curriculum, folder)(leaves)
     return made

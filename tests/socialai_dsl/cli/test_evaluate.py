@@ -31,7 +31,8 @@ def help_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def evaluated(capsys: Capture, *arguments: str) -> Any:
     capsys.readouterr()
-    assert main(["evaluate", *arguments, "--device", "cpu", "--json"]) == 0
+    device = [] if arguments[0] == "random" else ["--device", "cpu"]
+    assert main(["evaluate", *arguments, *device, "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 

@@ -18,6 +18,7 @@ from socialai_dsl.experiments import estimate
 from socialai_dsl.experiments.document import document_of
 from socialai_dsl.experiments.folder import Run, Status, runs_of
 from socialai_dsl.experiments.work import _Work
+from socialai_dsl.folder_lock import Holder
 from socialai_dsl.frontend import load_experiment
 
 Capture = pytest.CaptureFixture[str]
@@ -178,7 +179,10 @@ def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.Monke
     status.begin(1, 0)
     runs[1].write_status(status)
     (runs[1].path / "metrics.jsonl").write_text('{"frames": 50, "frames_per_second": 10.0}\n')
-    monkeypatch.setattr("socialai_dsl.experiments.folder.is_locked", lambda path: path.name == "1")
+    worker = Holder(1, "here", "now")
+    monkeypatch.setattr(
+        "socialai_dsl.experiments.folder.worker_of", lambda path: worker if path.name == "1" else None
+    )
     with RunsProgress(runs, stream) as shown:
         shown.ended(runs[0], "failed", "no memory")
         shown.look()
@@ -229,7 +233,7 @@ def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
     assert (given.scenario, given.agent, given.seed, given.frames) == ("social_env", "ppo", 5, 1000)
     assert parser.parse_args(chance._run_command()).seed == 5
     own = str(file.parent / "runs" / document["runs"][0]["id"])
-    for work, agent, seed in ((learns, own, 0), (chance, "random", 5)):
+    for work, agent, seed in ((learns, own, None), (chance, "random", 5)):
         asked = parser.parse_args(work._test_command(["help", "dance"]))
         assert (asked.run, asked.on, asked.episodes, asked.seed) == (agent, ["help", "dance"], 30, seed)
 

@@ -163,7 +163,7 @@ def test_a_warning_is_one_line_without_a_place_in_our_code(
         raise UsageError("enough")
 
     usual = warnings.formatwarning
-    monkeypatch.setattr(run_command, "create_run_folder", warn)
+    monkeypatch.setattr(run_command, "new_run_folder", warn)
     assert run_main([*RUN, "--out", str(tmp_path / "run")]) == 2
     assert capsys.readouterr().out == "socialai-run: warning: mind the gap\n"
     assert warnings.formatwarning is usual

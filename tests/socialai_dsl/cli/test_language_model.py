@@ -445,7 +445,10 @@ def test_mistakes_are_told_in_one_line(
 @pytest.mark.parametrize("time", ["0", "-1", "nan", "inf", "soon"])
 def test_a_time_out_is_a_time(time: str, capsys: Capture) -> None:
     assert main(["evaluate", "llm:m", "--on", "help", "--timeout", time]) == 2
-    assert f"--timeout: expected a number of seconds above 0, got '{time}'" in capsys.readouterr().err
+    assert (
+        f"--timeout: expected a number of seconds above 0, at most 31622400, got '{time}'"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(

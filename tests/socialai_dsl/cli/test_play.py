@@ -1,11 +1,15 @@
 """Playing from the keyboard, on a screen of 80x24: in this process, and through a real terminal of another."""
 
 import asyncio
+import json
 import os
 import re
+import shutil
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -117,9 +121,11 @@ def terminal() -> Iterator[Callable[..., Terminal]]:
         one.child.close(force=True)
 
 
-def test_talkitout_is_played_to_success_in_a_terminal(terminal: Callable[..., Terminal]) -> None:
+def test_talkitout_is_played_to_success_in_a_terminal(
+    terminal: Callable[..., Terminal], tmp_path: Path
+) -> None:
     steps = script("talkitout", SEED)
-    screen = terminal("play", "talkitout", "--seed", str(SEED))
+    screen = terminal("play", "talkitout", "--seed", str(SEED), "--out", str(tmp_path))
     first = screen.shows("step 0 ", "q quit")
     assert "Leave by the right one" in first
 
@@ -157,6 +163,61 @@ def test_talkitout_is_played_to_success_in_a_terminal(terminal: Callable[..., Te
     assert "\x1b[?1000l" in screen.written, "the mouse is let go"
     assert f"talkitout, seed {SEED}: success (" in screen.written[left:]
     assert "Traceback" not in screen.written
+
+    kept = events(tmp_path)
+    assert [event["event"] for event in kept[:4]] == ["session", "episode", "step", "undo"]
+    assert [event["success"] for event in kept if event["event"] == "end"] == [True, True]
+
+
+def events(folder: Path) -> list[dict[str, Any]]:
+    """The events of the only session below the folder, in which every time is one, and none goes back."""
+    (file,) = folder.rglob("played.jsonl")
+    found = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+    times = [datetime.fromisoformat(event["time"]) for event in found]
+    assert times == sorted(times)
+    assert all(time.tzinfo is not None for time in times)
+    return found
+
+
+@pytest.mark.parametrize("end", ["hang up", "SIGHUP", "SIGTERM", "SIGKILL"])
+def test_what_was_played_survives_whatever_ends_the_terminal(
+    end: str, terminal: Callable[..., Terminal], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of an evaluation every step is on disk before its picture; the next person gets a folder of their own."""
+    out = ["--out", str(tmp_path / "study")]
+    for participant in ("ada", "ada"):
+        screen = terminal("evaluate", "human", "--on", "talkitout", "--participant", participant, *out)
+        screen.shows("test episode 0", "step 0 ")
+        screen.press("x")
+        screen.shows("no success:")
+        screen.press("n")
+        screen.shows("test episode 1")
+        screen.press(ARROWS["left"])
+        screen.shows("step 1 ")
+        if end == "hang up":
+            screen.child.close(force=False)  # as when a window is closed
+        else:
+            screen.child.kill(getattr(signal, end))
+        screen.child.wait()
+
+    sessions = sorted((tmp_path / "study").iterdir())
+    assert len(sessions) == 2
+    assert len({event["session"] for session in sessions for event in events(session)[:1]}) == 2
+    for session in sessions:
+        assert session.name.startswith("ada-")
+        first, *played = events(session)
+        assert (first["format"], first["session"], first["scenario"]) == (
+            "socialai-played/1",
+            session.name,
+            "talkitout",
+        )
+        kinds = [event["event"] for event in played]
+        assert kinds == ["episode", "step", "end", "episode", "step"]
+        assert (played[2]["success"], played[4]["did"]) == (False, "left")
+    shutil.move(sessions[0], tmp_path / "sent")
+    page = tmp_path / "page.html"
+    assert main(["replay", str(tmp_path / "sent" / "talkitout"), "--out", str(page)]) == 0
+    assert "1 episode written" in capsys.readouterr().out
 
 
 def test_without_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

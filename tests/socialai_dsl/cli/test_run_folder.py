@@ -1,5 +1,6 @@
 """Names of run folders, files written in one go."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ from socialai_dsl import run_folder
 from socialai_dsl.errors import UsageError
 from socialai_dsl.run_folder import (
     SETTINGS,
-    create_run_folder,
+    new_run_folder,
     read_json,
     scenario_folder_name,
     versions,
@@ -34,7 +35,8 @@ def test_folder_names(spec: str, name: str) -> None:
 def test_two_runs_in_one_second_have_two_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(run_folder.time, "strftime", lambda _: "20260101-000000")
-    folders = [create_run_folder(None, "dance", 3) for _ in range(3)]
+    with contextlib.ExitStack() as runs:
+        folders = [runs.enter_context(new_run_folder(None, "dance", 3)) for _ in range(3)]
     assert [str(folder) for folder in folders] == [
         "runs/dance/20260101-000000-s3",
         "runs/dance/20260101-000000-s3-2",
@@ -43,10 +45,13 @@ def test_two_runs_in_one_second_have_two_folders(tmp_path: Path, monkeypatch: py
 
 
 def test_a_folder_with_a_run_is_not_overwritten(tmp_path: Path) -> None:
-    folder = create_run_folder(tmp_path / "new", "dance", 0)
-    write_json(folder / SETTINGS, {})
-    with pytest.raises(UsageError, match="holds a run already"):
-        create_run_folder(tmp_path / "new", "dance", 0)
+    with new_run_folder(tmp_path / "new", "dance", 0) as folder:
+        write_json(folder / SETTINGS, {})
+    with (
+        pytest.raises(UsageError, match="holds a run already"),
+        new_run_folder(tmp_path / "new", "dance", 0),
+    ):
+        pass
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:

@@ -31,12 +31,12 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def card(place: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    monkeypatch.chdir(place)
-    return Path("runs/here/model_card.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(place / "runs" / "here")
+    return Path("model_card.md").read_text(encoding="utf-8")
 
 
 def result() -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(Path("runs/here/result.json").read_text(encoding="utf-8"))
+    content: dict[str, Any] = json.loads(Path("result.json").read_text(encoding="utf-8"))
     return content
 
 
@@ -55,13 +55,13 @@ def test_the_front_matter_is_that_of_the_hub(card: str) -> None:
 
 
 def test_it_tells_what_was_trained_and_how_well_it_does(card: str) -> None:
-    figures, settings = result(), json.loads(Path("runs/here/config.json").read_text())
+    figures, settings = result(), json.loads(Path("config.json").read_text())
     low, high = figures["eval"]["success_interval"]
     assert f"95% interval {low:.1%} to {high:.1%} (Wilson)" in card
     assert figures["program_sha256"] in card
     assert f"{figures['frames']:,}" in card
     (weights,) = re.findall(r"`(checkpoints/\d+\.safetensors)`", card)
-    assert Path("runs/here", weights).is_file()
+    assert Path(weights).is_file()
     assert {"lr", "bonus", "guide", "recipe", "minibatches"} <= settings.keys()
     told_elsewhere = {"scenario", "agent", "seed", "device", "threads", "eval_episodes", *WITHOUT_EFFECT}
     for name, value in settings.items():
@@ -83,7 +83,7 @@ def test_its_code_plays_an_episode(card: str) -> None:
 @pytest.mark.thorough("trains twice")
 def test_its_command_trains_the_same_agent(card: str, tmp_path: Path) -> None:
     (command,) = re.findall(r"Trained again by `socialai-run ([^`]+)`", card)
-    given = r"corridor\.yaml --recipe guided --frames 1500 --seed 3 --envs 32 --bonus lang"
+    given = r"scenario/corridor\.yaml --recipe guided --frames 1500 --seed 3 --envs 32 --bonus lang"
     given += r" --threads \d --hyper lr=0\.0003 --hyper loss=per_head"
     assert re.fullmatch(given, command), "its bits depend on the threads, too"
     again = tmp_path / "again"

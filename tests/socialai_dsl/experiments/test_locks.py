@@ -1,24 +1,44 @@
-"""One worker works on a run, and one process writes its folder; whoever dies gives its lock back."""
+"""One worker works on a run, and one process writes a folder; who looks is in nobody's way, who dies holds nothing."""
 
+import os
+import socket
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from filelock import FileLock
 
 from socialai_dsl import run_folder
 from socialai_dsl.errors import UsageError
-from socialai_dsl.experiments.folder import Run, Status, is_locked
+from socialai_dsl.experiments.driver import _known
+from socialai_dsl.experiments.folder import Run, Status, worker_of
 from socialai_dsl.experiments.work import Outcome, _performed_alone, cancel, retry
+from socialai_dsl.folder_lock import hold
 from socialai_dsl.run_folder import only_writer
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Run:
     return Run(tmp_path, "abc", {"name": "one", "frames": 100, "options": {}}, 0, ())
+
+
+@pytest.fixture
+def other(tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
+    """Another process that works on the run and writes its folder."""
+    script = (
+        "import time; from pathlib import Path; from socialai_dsl.folder_lock import hold\n"
+        f"folder = Path({str(tmp_path)!r})\n"
+        "with hold(folder, 'worker'), hold(folder, 'run'): print('held', flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "held\n"
+        yield process
+        process.kill()
 
 
 def test_one_of_many_works(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,26 +62,46 @@ def test_one_of_many_works(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(ends) == [Outcome.DONE, *[Outcome.HELD] * 7]
 
 
-def test_a_worker_that_was_killed_holds_nothing(run: Run) -> None:
+def test_who_looks_keeps_nobody_from_working(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many look all the time, in every way there is, each of many tries to work succeeds."""
+    monkeypatch.setattr("socialai_dsl.experiments.work._Work.perform", lambda _: (Outcome.DONE, ""))
     run.write_status(Status("running"))
-    script = (
-        "import time; from filelock import FileLock\n"
-        f"lock = FileLock({str(run.path / 'worker.lock')!r}); lock.acquire()\n"
-        "print('locked', flush=True); time.sleep(60)"
-    )
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as worker:
-        assert worker.stdout is not None
-        assert worker.stdout.readline() == "locked\n"
-        assert is_locked(run.path)
-        assert run.shown_status().state == "running"
-        assert not retry(run)
-        worker.kill()
-    assert not is_locked(run.path)
+    over, looks = threading.Event(), []
+
+    def look() -> None:
+        while not over.is_set():
+            looks.append((worker_of(run.path), run.shown_status(), _known(run)))
+
+    threads = [threading.Thread(target=look) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    try:
+        ends = [_performed_alone(run, lambda: False)[0] for _ in range(300)]
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+    assert ends == [Outcome.DONE] * 300
+    assert len(looks) > 100
+
+
+def test_a_worker_is_named_until_it_is_killed(run: Run, other: "subprocess.Popen[str]") -> None:
+    run.write_status(Status("running"))
+    found = worker_of(run.path)
+    assert found is not None
+    assert (found.pid, found.host) == (other.pid, socket.gethostname())
+    assert abs((datetime.now(UTC) - datetime.fromisoformat(found.since)).total_seconds()) < 60
+    assert run.shown_status().state == "running"
+    assert not retry(run)
+    other.kill()
+    other.wait()
+    assert worker_of(run.path) is None
     assert run.shown_status().state == "waiting"
+    assert retry(run)
 
 
 def test_looking_at_a_run_makes_nothing_in_its_folder(run: Run) -> None:
-    assert not is_locked(run.path)
+    assert worker_of(run.path) is None
     assert list(run.path.iterdir()) == []
 
 
@@ -73,36 +113,33 @@ def test_a_run_that_nobody_works_on_is_given_up_at_once(run: Run) -> None:
     assert not run.is_cancelled()
 
 
-def test_two_processes_do_not_write_one_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_processes_do_not_write_one_folder(
+    tmp_path: Path, other: "subprocess.Popen[str]", monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(run_folder, "_SECONDS_TO_WAIT", 0.1)
-    with only_writer(tmp_path), pytest.raises(UsageError, match="another process is at work on this run"):
-        _in_a_thread(tmp_path)
+    who = f"another process is writing this folder \\(process {other.pid} on "
+    with pytest.raises(UsageError, match=who), only_writer(tmp_path):
+        pass
+    other.kill()
+    other.wait()
+    with only_writer(tmp_path):
+        pass
     with only_writer(tmp_path):
         pass
 
 
-def _in_a_thread(folder: Path) -> None:
-    """Another thread stands for another process, because a lock belongs to an open file."""
-    raised: list[BaseException] = []
-
-    def try_it() -> None:
-        try:
-            with only_writer(folder):
-                pass
-        except UsageError as error:
-            raised.append(error)
-
-    thread = threading.Thread(target=try_it)
-    thread.start()
-    thread.join()
-    if raised:
-        raise raised[0]
+def test_an_error_of_the_writer_gives_the_lock_back(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), hold(tmp_path, "run"):
+        raise ZeroDivisionError
+    with hold(tmp_path, "run"):
+        assert sorted(os.listdir(tmp_path)) == ["run.lock", "run.owner"]
+    assert os.listdir(tmp_path) == []
 
 
-def test_the_next_writer_waits_for_one_that_is_about_to_die(tmp_path: Path) -> None:
-    lock = FileLock(tmp_path / run_folder.LOCK, thread_local=False)
-    lock.acquire()
-    threading.Timer(0.3, lock.release).start()
+def test_the_next_writer_waits_for_one_that_is_about_to_die(
+    tmp_path: Path, other: "subprocess.Popen[str]"
+) -> None:
+    threading.Timer(0.3, other.kill).start()
     began = time.monotonic()
     with only_writer(tmp_path):
         assert time.monotonic() - began > 0.2

@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from filelock import FileLock
 
+from socialai_dsl.folder_lock import hold
 from socialai_dsl.reporting.collect import Run, read_experiment, read_runs
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
 
@@ -55,7 +55,7 @@ def test_a_run_whose_worker_is_gone_has_stopped(folder: Path) -> None:
     run = folder / "runs" / "c0-s0"
     (run / "status.json").write_text(json.dumps({"state": "running", "attempts": [1]}))
     assert runs(folder)[0].state == "running"
-    with FileLock(run / "worker.lock"):
+    with hold(run, "worker"):
         assert runs(folder)[0].state == "running"
     assert runs(folder)[0].state == "stopped"
 
