@@ -48,6 +48,7 @@ export class Editor {
     this.connect();
   }
 
+  /** Connect to a language server; after a connection is lost, to another one, which is told of all files again. */
   connect() {
     const socket = new WebSocket(this.options.language);
     /** @type {Set<(message: string) => void>} */ const handlers = new Set();
@@ -58,16 +59,18 @@ export class Editor {
         subscribe: (handler) => void handlers.add(handler),
         unsubscribe: (handler) => void handlers.delete(handler),
       });
-    socket.onclose = () => this.client.disconnect();
+    socket.onclose = () => {
+      this.client.disconnect();
+      setTimeout(() => this.connect(), 1000);
+    };
   }
 
-  /** Show a file; with its text where it was not shown before, or is to begin anew.
-   * @param {string} name @param {string} text @param {boolean} anew */
-  open(name, text, anew = false) {
+  /** Show a file; with this text where it was not shown before.
+   * @param {string} name @param {string} text */
+  open(name, text) {
     if (this.name) this.states.set(this.name, this.view.state);
     this.name = name;
-    const known = anew ? undefined : this.states.get(name);
-    this.view.setState(known ?? EditorState.create({ doc: text, extensions: this.extensions(name) }));
+    this.view.setState(this.states.get(name) ?? EditorState.create({ doc: text, extensions: this.extensions(name) }));
   }
 
   /** @param {string} name */

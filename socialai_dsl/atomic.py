@@ -15,7 +15,8 @@ def write_text(path: Path, text: str) -> None:
     """Write a file by replacing it in one go; a file that is there keeps its permissions."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}")
     try:
-        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
+        temporary.unlink(missing_ok=True)
+        with open(temporary, "x", encoding="utf-8", newline="\n") as file:
             if path.exists():
                 os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
             file.write(text)

@@ -13,6 +13,7 @@ from socialai_dsl.cli.arguments import natural
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import SUFFIXES
+from socialai_dsl.studio import MOST_WINDOWS
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
 _PORT: Final = 8765
@@ -39,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=natural, metavar="N", help=f"port (default: {_PORT}, or the next free one)"
     )
     parser.add_argument(
+        "--windows",
+        type=int,
+        default=MOST_WINDOWS,
+        metavar="N",
+        help=f"how many windows may be open at once; each has processes of its own (default: {MOST_WINDOWS})",
+    )
+    parser.add_argument(
         "--no-browser", action="store_true", help="print the address and do not open a browser"
     )
 
@@ -51,19 +59,24 @@ def execute(arguments: argparse.Namespace) -> Exit:
         import websockets  # noqa: F401
     except ImportError as error:
         raise UsageError(f"the studio needs {error.name}: pip install 'socialai-dsl[studio]'") from None
-    from socialai_dsl.studio.server import LARGEST_MESSAGE, Studio
+    from socialai_dsl.studio.address import Address, remember, remembered
+    from socialai_dsl.studio.server import LARGEST_FRAME, Studio
 
+    if arguments.windows < 1:
+        raise UsageError(f"--windows: got {arguments.windows}, expected at least 1")
     root, opened = _opened(arguments.path)
-    listening = _listen(arguments.host, arguments.port)
-    port, token = listening.getsockname()[1], secrets.token_urlsafe(24)
+    former = remembered(root, arguments.host)
+    listening = _listen(arguments.host, arguments.port, former.port if former else None)
+    port, token = listening.getsockname()[1], former.token if former else secrets.token_urlsafe(24)
+    remember(root, arguments.host, Address(token=token, port=port))
     shown = "127.0.0.1" if arguments.host in ("0.0.0.0", "::") else arguments.host
     address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/?token={token}"
     print(f"studio of {root}: {address}\nCtrl-C ends it", flush=True)
     if not arguments.no_browser and not _open(address):
         print("no browser could be opened; open the address yourself", flush=True)
-    studio = Studio(root, opened, token, arguments.host)
+    studio = Studio(root, opened, token, arguments.host, arguments.windows)
     config = uvicorn.Config(
-        studio.app, log_level="error", ws="websockets-sansio", ws_max_size=LARGEST_MESSAGE, access_log=False
+        studio.app, log_level="error", ws="websockets-sansio", ws_max_size=LARGEST_FRAME, access_log=False
     )
     with contextlib.suppress(KeyboardInterrupt):
         uvicorn.Server(config).run(sockets=[listening])
@@ -88,25 +101,26 @@ def _opened(path: Path) -> tuple[Path, str]:
     raise UsageError(f"{what}; expected a folder, or a file that ends in .yaml")
 
 
-def _listen(host: str, port: int | None) -> socket.socket:
-    """A socket at the port, or where none is asked for at the next free one.
+def _listen(host: str, port: int | None, former: int | None) -> socket.socket:
+    """A socket at the port, or where none is asked for at the former one, or at the next free one.
 
     Raises:
         UsageError: the port is in use, or the address is not this machine's.
     """
     if port is not None and not 0 <= port < 1 << 16:
         raise UsageError(f"--port: got {port}, expected 0 to 65535")
-    tried = [port] if port is not None else list(range(_PORT, _PORT + _TRIED))
+    usual = range(_PORT, _PORT + _TRIED)
+    tried = [port] if port is not None else [*([former] if former else []), *usual]
     for one in tried:
         try:
             family = socket.AF_INET6 if ":" in host else socket.AF_INET
             return socket.create_server((host, one), family=family)
         except OSError as error:
-            if error.errno != errno.EADDRINUSE:
+            if error.errno != errno.EADDRINUSE and (port is not None or one != former):
                 raise UsageError(f"--host {host}: {error.strerror or error}") from None
     if port is not None:
         raise UsageError(f"--port: {port} is in use; leave it out to take a free one")
-    raise UsageError(f"--port: {tried[0]} to {tried[-1]} are in use; name another")
+    raise UsageError(f"--port: {usual[0]} to {usual[-1]} are in use; name another")
 
 
 def _open(address: str) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import multiprocessing
 import os
 import socket
@@ -12,17 +11,24 @@ import threading
 from collections.abc import Callable
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from pydantic import ValidationError
+
+from socialai_dsl.studio.files import PLAYERS
+from socialai_dsl.studio.messages import ANSWERS, Begin, Check, Question
 from socialai_dsl.studio.worker import answer_window
 
 _LONGEST_ANSWER: Final = 32 << 20
 _START_SECONDS: Final = 120.0
+_CHECK_SECONDS: Final = 90.0
+_LOADING_SECONDS: Final = 60.0
+_USUAL_SECONDS: Final = 10.0
 _SAFE_PATH: Final = "PYTHONSAFEPATH"
 
 _forking = multiprocessing.get_context("forkserver")
 _forking.set_forkserver_preload(["socialai_dsl.studio.warm"])
-_starting = threading.Lock()
+_list = threading.Lock()
 
 
 class EngineLostError(Exception):
@@ -45,9 +51,7 @@ class Worker:
     async def stop(self) -> None:
         """End the process and wait for it."""
         self.writer.close()
-        self._process.kill()
-        await asyncio.to_thread(self._process.join)
-        self._process.close()
+        await asyncio.to_thread(_end, self._process)
 
 
 async def start_worker(run: Callable[[socket.socket, str], None], root: Path) -> Worker:
@@ -56,32 +60,59 @@ async def start_worker(run: Callable[[socket.socket, str], None], root: Path) ->
     Raises:
         EngineLostError: it could not be started.
     """
-    ours, theirs = socket.socketpair()
-    process = _forking.Process(target=run, args=(theirs, str(root)), daemon=True)
+    starting = asyncio.get_running_loop().run_in_executor(None, _start, run, root)
     try:
-        await asyncio.wait_for(asyncio.to_thread(_start, process), _START_SECONDS)
-    except (OSError, EOFError, TimeoutError):
-        ours.close()
+        # Shielded, since a start cannot be taken back: whoever does not wait for it any more lets it end afterwards.
+        process, ours = await asyncio.wait_for(asyncio.shield(starting), _START_SECONDS)
+    except (OSError, EOFError):
         raise EngineLostError("the engine's process could not be started") from None
-    finally:
-        theirs.close()
+    except TimeoutError:
+        starting.add_done_callback(_drop)
+        raise EngineLostError("the engine's process could not be started in time") from None
+    except asyncio.CancelledError:
+        starting.add_done_callback(_drop)
+        raise
     return Worker(process, *await asyncio.open_connection(sock=ours, limit=_LONGEST_ANSWER))
 
 
-def _start(process: BaseProcess) -> None:
+def _start(run: Callable[[socket.socket, str], None], root: Path) -> tuple[BaseProcess, socket.socket]:
     """Start one process at a time, as `multiprocessing` keeps a common list of them.
+
+    Returns the process, and the connection to it.
 
     The fork server is a Python of its own, which is not to import modules of the folder that happens to be open.
     """
-    with _starting:
+    ours, theirs = socket.socketpair()
+    process = _forking.Process(target=run, args=(theirs, str(root)), daemon=True)
+    with theirs, _list:
         before = os.environ.get(_SAFE_PATH)
         os.environ[_SAFE_PATH] = "1"
         try:
             process.start()
+        except BaseException:
+            ours.close()
+            raise
         finally:
             del os.environ[_SAFE_PATH]
             if before is not None:
                 os.environ[_SAFE_PATH] = before
+    return process, ours
+
+
+def _end(process: BaseProcess) -> None:
+    """End a process. Not while another is started, which looks through the common list and reads from each of it."""
+    process.kill()
+    with _list:
+        process.join()
+        process.close()
+
+
+def _drop(started: asyncio.Future[tuple[BaseProcess, socket.socket]]) -> None:
+    """End a process that nobody waits for."""
+    if not started.cancelled() and started.exception() is None:
+        process, ours = started.result()
+        ours.close()
+        threading.Thread(target=_end, args=(process,)).start()
 
 
 class Engine:
@@ -96,32 +127,49 @@ class Engine:
         self._worker: Worker | None = None
         self._turn = asyncio.Lock()
 
-    async def ask(self, question: dict[str, Any], seconds: float) -> dict[str, Any]:
-        """The answer to a question.
+    async def ask(self, question: Question) -> str:
+        """The answer to a question, as JSON.
 
         Raises:
-            EngineLostError: none came within `seconds`, or the process has ended.
+            EngineLostError: none came in time, or the process has ended.
         """
+        seconds = _seconds(question)
         async with self._turn:
             if self._worker is None:
                 self._worker = await start_worker(answer_window, self._root)
             try:
-                self._worker.writer.write(json.dumps(question).encode() + b"\n")
+                self._worker.writer.write(question.model_dump_json().encode() + b"\n")
                 line = await asyncio.wait_for(self._worker.reader.readline(), seconds)
             except TimeoutError:
                 await self.stop()
                 raise EngineLostError(f"this took longer than {seconds:g} seconds and was stopped") from None
             except (OSError, ValueError):
                 line = b""
-            if not line:
+            if not line.endswith(b"\n"):
                 await self.stop()
                 raise EngineLostError("the engine's process has ended; it is started again")
-            answer: dict[str, Any] = json.loads(line)
-            return answer
+            try:
+                answer = ANSWERS.validate_json(line)
+            except ValidationError:
+                answer = None
+            if answer is None or answer.id != question.id or answer.do not in (question.do, "refused"):
+                await self.stop()
+                raise EngineLostError(
+                    "the engine's process gave an answer to something else; it is started again"
+                )
+            return line.decode().rstrip("\n")
 
     async def stop(self) -> None:
-        """End the process."""
+        """End the process. The next question starts another."""
         worker, self._worker = self._worker, None
         if worker is not None:
             with contextlib.suppress(OSError):
                 await worker.stop()
+
+
+def _seconds(question: Question) -> float:
+    """How long an answer may take."""
+    if isinstance(question, Check):
+        return _CHECK_SECONDS
+    loads = isinstance(question, Begin) and question.player not in PLAYERS
+    return _LOADING_SECONDS if loads else _USUAL_SECONDS

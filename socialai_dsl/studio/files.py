@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import re
+import threading
+import unicodedata
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from urllib.parse import quote
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader.reader import MAX_FILE_BYTES, SUFFIXES, read_source
+from socialai_dsl.loader.reader import FORBIDDEN, MAX_FILE_BYTES, SUFFIXES, read_source
+from socialai_dsl.studio.drafts import Draft, Drafts, new_window
+from trainer.shipped import PREFIX, shipped_agents
 
-_DRAFTS: Final = ".studio"
+PLAYERS: Final = ("me", "script", "random")
 _MOST_FILES: Final = 500
-_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,60}\.(yaml|yml)")
+_LONGEST_PART: Final = 200
+_LONGEST_NAME: Final = 1000
+_LINE_END_OR_BACKSLASH: Final = re.compile(r"[\t\n\r\\]")
 
 
 class FileError(ValueError):
@@ -24,11 +31,29 @@ class FileError(ValueError):
 
 
 class ConflictError(FileError):
-    """Another program has written the file since it was read."""
+    """Another program or window has written the file since it was read."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A file as a window opens it.
+
+    Attributes:
+        text, digest: what the file holds; empty and None where it is gone, and drafts of it are left.
+        draft: what this window, or one that was closed, had typed into it.
+        others: further drafts of windows that are closed, and of what was written over.
+        elsewhere: how many other windows have typed into it and not saved.
+    """
+
+    text: str
+    digest: str | None
+    draft: Draft | None
+    others: list[Draft]
+    elsewhere: int
 
 
 class Folder:
-    """The scenarios of a folder.
+    """The scenarios of a folder, and the drafts of its windows.
 
     Args:
         root: the folder.
@@ -36,37 +61,62 @@ class Folder:
 
     def __init__(self, root: Path) -> None:
         self.root = root.resolve()
+        self._drafts = Drafts(self.root)
+        self._turn = threading.RLock()
 
     def scenarios(self) -> list[str]:
-        """Names of YAML files, as seen from the folder, without hidden ones."""
+        """Names of YAML files, as seen from the folder, without hidden ones; also of those that only have drafts."""
         found: list[str] = []
         for place, folders, files in os.walk(self.root):
             folders[:] = sorted(name for name in folders if not name.startswith((".", "node_modules")))
-            names = (Path(place, name) for name in sorted(files) if name.endswith(SUFFIXES))
-            found += [path.relative_to(self.root).as_posix() for path in names if self._is_inside(path)]
+            names = (Path(place, name).relative_to(self.root).as_posix() for name in sorted(files))
+            found += [name for name in names if self._may_be_opened(name)]
             if len(found) >= _MOST_FILES:
                 break
-        return found[:_MOST_FILES]
+        gone = {name for name in self._drafts.names() if self._may_be_opened(name)} - set(found)
+        return [*found[:_MOST_FILES], *sorted(gone)]
 
     def runs(self) -> list[str]:
         """Folders of runs that have a checkpoint, as seen from the folder."""
         found = [
             path.parent for depth in ("*", "*/*", "*/*/*") for path in self.root.glob(f"{depth}/checkpoints")
         ]
-        return sorted(path.relative_to(self.root).as_posix() for path in found if self._is_inside(path))
+        inside = (path for path in found if path.resolve().is_relative_to(self.root))
+        return sorted(path.relative_to(self.root).as_posix() for path in inside)
 
-    def path(self, name: str) -> Path:
-        """Where a scenario of this name lies.
+    def players(self) -> list[str]:
+        """The trained agents to watch: of the folder's runs, and those that ship."""
+        return [*self.runs(), *(PREFIX + name for name in shipped_agents())]
+
+    def player(self, name: str) -> str:
+        """A player as `Session.begin` knows it; runs are named as seen from the folder.
 
         Raises:
-            FileError: it is no YAML file, or would lie outside of the folder.
+            FileError: there is none of this name.
         """
-        path = self.root / name
-        if "\0" in name or path.suffix not in SUFFIXES:
-            raise FileError(f"{name!r}: expected a name that ends in .yaml")
-        if not self._is_inside(path) or _DRAFTS in Path(name).parts:
-            raise FileError(f"{name}: lies outside of the opened folder")
-        return path.resolve()
+        if name in PLAYERS:
+            return name
+        if name not in self.players():
+            raise FileError(f"{_shown(name)}: there is no such run in the folder")
+        return name if name.startswith(PREFIX) else str(self.root / name)
+
+    def path(self, name: str) -> Path:
+        """Where a scenario of this name lies, links followed. Every operation asks here what a name may be.
+
+        Raises:
+            FileError: it may not be the name of a scenario, or a link leads out of the folder or to something else.
+        """
+        wrong = name_problem(name)
+        if wrong:
+            raise FileError(f"{_shown(name)}: {wrong}")
+        try:
+            path = (self.root / name).resolve()
+            wrong = name_problem(path.relative_to(self.root).as_posix())
+        except (OSError, RuntimeError, ValueError):
+            raise FileError(f"{name}: lies outside of the opened folder") from None
+        if wrong:
+            raise FileError(f"{name}: is a link to something that is no scenario of this folder")
+        return path
 
     def read(self, name: str) -> tuple[str, str]:
         """The text of a scenario, and its digest.
@@ -81,13 +131,15 @@ class Folder:
             raise FileError(f"{name}: {error.diagnostics[0].text}") from None
         return text, digest(text)
 
-    def write(self, name: str, text: str, known: str | None) -> str:
-        """Write a scenario, and forget its draft.
+    def write(self, name: str, text: str, known: str | None, window: str, over: bool = False) -> str:
+        """Write a scenario, and forget this window's draft of it.
 
         Args:
             name: of the file.
             text: what it is to hold.
             known: digest of what it held when it was read; None for a new file.
+            window: who writes.
+            over: write over what was written by others since; that is kept as a draft.
 
         Returns:
             The digest of the text.
@@ -99,63 +151,180 @@ class Folder:
         path = self.path(name)
         if len(text.encode()) > MAX_FILE_BYTES:
             raise FileError(f"{name}: the text is larger than {MAX_FILE_BYTES // 1024} KiB")
-        there = path.exists()
-        if there and not os.access(path, os.W_OK):
-            raise FileError(f"{name}: this user may not write the file")
-        if there and (known is None or self.read(name)[1] != known):
-            raise ConflictError(f"{name} was changed elsewhere since it was opened here")
-        try:
+        with self._turn, _told(name, "cannot be written"):
+            if path.exists():
+                if not os.access(path, os.W_OK):
+                    raise FileError(f"{name}: this user may not write the file")
+                self._make_way(name, text, known, over)
             write_text(path, text)
-        except OSError as error:
-            raise FileError(f"{name}: cannot be written: {error.strerror}") from None
-        self.forget_draft(name)
+            self._drafts.forget(name, window)
         return digest(text)
 
-    def create(self, name: str, text: str) -> str:
+    def create(self, name: str, text: str, window: str) -> str:
         """Write a new file under this name, or where there is one under the name with a number; which it is."""
-        if not _NAME.fullmatch(name):
-            raise FileError(f"{name!r}: expected letters, digits and underscores, and the ending .yaml")
-        stem, number, free = Path(name).stem, 2, name
-        while (self.root / free).exists():
-            free, number = f"{stem}_{number}.yaml", number + 1
-        self.write(free, text, None)
+        self.path(name)
+        stem, suffix = os.path.splitext(name)
+        with self._turn:
+            number, free = 2, name
+            while self.is_taken(free):
+                free, number = f"{stem}_{number}{suffix}", number + 1
+            self.write(free, text, None, window)
         return free
+
+    def is_taken(self, name: str) -> bool:
+        """Whether there is something of this name, or of one that some file systems do not tell from it."""
+        path = self.root / name
+        try:
+            return _folded(path.name) in map(_folded, os.listdir(path.parent))
+        except OSError:
+            return False
 
     # -- what was typed and not saved ------------------------------------------------------------------------
 
-    def keep_draft(self, name: str, text: str) -> None:
-        """Keep what was typed into a file beside it, until it is saved."""
-        draft = self._draft(name)
-        try:
-            draft.parent.mkdir(exist_ok=True)
-            write_text(draft, text)
-        except OSError as error:
-            raise FileError(f"{name}: the draft cannot be kept: {error.strerror}") from None
+    def open(self, name: str, window: str, live: Collection[str], adopt: bool = True) -> Opened:
+        """A file as a window opens it.
 
-    def draft(self, name: str) -> str | None:
-        """The unsaved text of a file; None without one."""
-        try:
-            return self._draft(name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            return None
+        Args:
+            name: of the file.
+            window: who opens it.
+            live: the windows that are open.
+            adopt: what a closed window has typed last becomes this one's draft, unless this one has its own.
 
-    def forget_draft(self, name: str) -> None:
-        """Forget what was typed and not saved."""
-        with contextlib.suppress(OSError):
-            self._draft(name).unlink()
+        Raises:
+            FileError: it cannot be read, or is no text.
+        """
+        path = self.path(name)
+        with self._turn:
+            drafts = self._drafts.of(name)
+            text, known = ("", None) if drafts and not path.exists() else self.read(name)
+            closed = [one for one in drafts if one.window == window or one.window not in live]
+            for one in [one for one in closed if one.text == text and known is not None]:
+                closed.remove(one)
+                with suppress(OSError):
+                    self._drafts.forget(name, one.window)
+            own = next((one for one in closed if one.window == window), None)
+            left = own or next((one for one in closed if adopt and not one.aside), None)
+            if own is None and left is not None:
+                with suppress(OSError):  # then it stays where it is
+                    own = self._drafts.hand_over(left, window)
+            elsewhere = {one.window for one in drafts} & {*live} - {window}
+            return Opened(
+                text, known, own or left, [one for one in closed if one is not left], len(elsewhere)
+            )
 
-    def _draft(self, name: str) -> Path:
+    def keep_draft(self, name: str, text: str, base: str | None, window: str) -> None:
+        """Keep what was typed into a file, until it is saved.
+
+        Raises:
+            FileError: it cannot be kept.
+        """
         self.path(name)
-        return self.root / _DRAFTS / quote(name, safe="")
+        with self._turn, _told(name, "the draft cannot be kept"):
+            self._drafts.keep(name, text, base, window)
 
-    def _is_inside(self, path: Path) -> bool:
-        """Whether a path, its links followed, lies in the folder."""
+    def take_draft(self, name: str, draft: str, window: str, live: Collection[str]) -> Draft:
+        """Make the draft of a closed window this window's, whose own is put aside.
+
+        Raises:
+            FileError: there is none, or it cannot be kept.
+        """
+        with self._turn, _told(name, "the draft cannot be kept"):
+            taken = self._closed(name, draft, live)
+            own = [one for one in self._drafts.of(name) if one.window == window]
+            for one in own:
+                self._drafts.hand_over(one, new_window(), aside=True)
+            return self._drafts.hand_over(taken, window)
+
+    def discard_draft(self, name: str, draft: str, live: Collection[str]) -> None:
+        """Delete the draft of a closed window.
+
+        Raises:
+            FileError: there is none, or it cannot be deleted.
+        """
+        with self._turn, _told(name, "the draft cannot be deleted"):
+            self._drafts.forget(name, self._closed(name, draft, live).window)
+
+    def forget_draft(self, name: str, window: str) -> None:
+        """Forget what a window has typed, since it equals the file.
+
+        Raises:
+            FileError: it cannot be deleted.
+        """
+        self.path(name)
+        with self._turn, _told(name, "the draft cannot be deleted"):
+            self._drafts.forget(name, window)
+
+    def _closed(self, name: str, draft: str, live: Collection[str]) -> Draft:
+        """The draft of a window that is closed."""
+        self.path(name)
+        found = next(
+            (one for one in self._drafts.of(name) if one.window == draft and draft not in live), None
+        )
+        if found is None:
+            raise FileError(f"{name}: there is no such draft any more")
+        return found
+
+    def _make_way(self, name: str, text: str, known: str | None, over: bool) -> None:
+        """Let a text be written over what a file holds, unless that is news to who writes it."""
+        there, now = self.read(name)
+        if there == text or now == known:
+            return
+        if not over:
+            raise ConflictError(f"{name} was changed elsewhere since it was opened here")
+        self._drafts.keep(name, there, digest(text), new_window(), aside=True)
+
+    def _may_be_opened(self, name: str) -> bool:
         try:
-            return path.resolve().is_relative_to(self.root)
-        except (OSError, RuntimeError, ValueError):
+            self.path(name)
+        except FileError:
             return False
+        return True
+
+
+def name_problem(name: str) -> str | None:
+    """The reason why a scenario may not have this name, as seen from the folder; None if it may.
+
+    A name is that of a YAML file in the folder or in a folder below it, written with `/`. No part of it is hidden or
+    leads upwards, none has control characters, line ends or backslashes, and all are short enough for the file that is
+    put beside them while they are written.
+    """
+    if FORBIDDEN.search(name) or _LINE_END_OR_BACKSLASH.search(name):
+        return "expected a name without control characters, line ends and backslashes"
+    if len(name.encode()) > _LONGEST_NAME:
+        return f"expected a name of at most {_LONGEST_NAME} bytes"
+    parts = name.split("/")
+    if name.startswith("/") or ".." in parts:
+        return "lies outside of the opened folder"
+    if any(not part or part.startswith(".") for part in parts):
+        return "expected a name of which no part is empty or begins with a dot"
+    if any(part != part.strip() for part in parts):
+        return "expected a name of which no part begins or ends with a blank"
+    if any(len(part.encode()) > _LONGEST_PART for part in parts):
+        return f"expected a name of which no part has more than {_LONGEST_PART} bytes"
+    if not name.endswith(SUFFIXES):
+        return "expected a name that ends in .yaml"
+    return None
 
 
 def digest(text: str) -> str:
     """By which one text is known from another."""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+@contextmanager
+def _told(name: str, what: str) -> Iterator[None]:
+    """Say in words that the system does not do something with a file."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"{name}: {what}: {error.strerror}") from None
+
+
+def _folded(name: str) -> str:
+    """A file's name, so that two are equal that some file systems do not tell apart."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def _shown(name: str) -> str:
+    """A name that may be anything, in a message."""
+    return ascii(name if len(name) <= 80 else name[:60] + "...")

@@ -24,11 +24,14 @@ from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
+from socialai_dsl.studio.files import PLAYERS
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
 Reply = dict[str, Any]
 
+_CHECK_SECONDS: Final = 20.0
+_ENDED: Final = "the episode has ended; take steps back, or begin another"
 _FLOOR: Final = prelude().types["floor"].code
 
 
@@ -58,6 +61,7 @@ class Session:
         self._player, self._seed = "me", 0
         self._policy: Any = None
         self._chance = np.random.default_rng(0)
+        self._prepared = False
 
     def draw(self, path: str, text: str, seed: int = 0) -> Reply:
         """Check a text that is to stand in a file, and draw its room if it is sound."""
@@ -86,8 +90,6 @@ class Session:
         """
         if not self._texts:
             raise RefusalError("there is no scenario yet")
-        if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 1 << 63:
-            raise RefusalError(f"seed: got {seed!r}, expected a whole number from 0")
         if player != self._player:
             self._choose(player)
         env, tracer = self._playing()
@@ -120,9 +122,24 @@ class Session:
             raise RefusalError(self._phrases.problem(line if line is not None else sentence or "")) from None
         return self._step(action, None)
 
+    def prepare(self) -> None:
+        """Take a step and take it back, if none was taken yet: the first one prepares all explanations.
+
+        Raises:
+            RefusalError: there is no room yet.
+        """
+        env, _ = self._playing()
+        if not self._prepared and len(self._moments) == 1:
+            self._prepared = True
+            env.step(env.encode_action((None, None)))
+            env.explain()
+            env.restore(self._moments[0].snapshot)
+
     def auto(self) -> Reply:
         """Let the chosen player play a step."""
         env, _ = self._playing()
+        if not self._moments or self._moments[-1].ended:
+            raise RefusalError(_ENDED)
         if self._player == "script":
             return self._step(env.scripted_action(), None)
         sizes = env.action_space.nvec  # type: ignore[attr-defined]
@@ -151,7 +168,7 @@ class Session:
                 self._policy.think(before.observation)
         return {"length": to}
 
-    def place(self, who: str, at: list[int]) -> Reply:
+    def place(self, who: str, at: tuple[int, int]) -> Reply:
         """Begin again in the same room with one thing somewhere else; the layout is told, too."""
         env, _ = self._playing()
         described = env.describe()
@@ -161,14 +178,16 @@ class Session:
         found = described.get(key)
         one = (
             found[int(index)]
-            if isinstance(found, list) and index.isdigit() and int(index) < len(found)
+            if isinstance(found, list) and index.isdecimal() and int(index) < len(found)
             else found
         )
         if not isinstance(one, dict) or "at" not in one:
             raise RefusalError(f"there is nothing called {who!r} in the room")
-        one["at"] = at
+        one["at"] = list(at)
         layout = start_layout(described) | ({"member": described["member"]} if "member" in described else {})
-        cell = env.scene().codes[at[1], at[0]] if _is_cell(at, described["room"]) else None
+        room = described["room"]
+        inside = 0 <= at[0] < room["width"] and 0 <= at[1] < room["height"]
+        cell = env.scene().codes[at[1], at[0]] if inside else None
         if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
             raise RefusalError(f"{who} cannot be put there")
         return self.begin(self._seed, self._player, layout) | {"layout": layout}
@@ -204,7 +223,7 @@ class Session:
         _, tracer = self._playing()
         return {"page": replay_page([tracer.trace().portable()])}
 
-    def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
+    def check(self, path: str, text: str) -> Reply:
         """What `socialai check` says of a text."""
         from socialai_dsl.analysis.check import check_scenario
         from socialai_dsl.analysis.effort import Clock, Effort
@@ -215,7 +234,7 @@ class Session:
             return {"lines": [f"{one.span}: {one.text}" for one in error.diagnostics]}
         if not isinstance(loaded, LoadedScenario):
             raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
-        effort = Effort(100, 0, clock=Clock(seconds, lambda said: None))
+        effort = Effort(100, 0, clock=Clock(_CHECK_SECONDS, lambda said: None))
         return {"lines": list(check_scenario(loaded, display_name(Path(path)), effort).lines())}
 
     # -- within ----------------------------------------------------------------------------------------------
@@ -228,6 +247,7 @@ class Session:
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
         self._game = env, Tracer(env, loaded.name, "me", endings, about_of(loaded))
         self._player, self._policy, self._moments = "me", None, []
+        self._prepared = False
 
     def _choose(self, player: str) -> None:
         """Change the player."""
@@ -244,7 +264,7 @@ class Session:
                 raise RefusalError("the variant `oracle` gives the agent no frame")
         self._use(loaded)
         env, tracer = self._playing()
-        if player not in ("me", "script", "random"):
+        if player not in PLAYERS:
             self._policy = _policy(player, env)
         self._player = tracer.agent = player
 
@@ -256,9 +276,14 @@ class Session:
     def _step(self, action: NDArray[np.int64], thought: Thought | None) -> Reply:
         env, tracer = self._playing()
         if not self._moments or self._moments[-1].ended:
-            raise RefusalError("the episode has ended; take steps back, or begin another")
+            raise RefusalError(_ENDED)
         before = tracer.counts()
-        observation, reward, terminated, truncated, info = env.step(action)
+        try:
+            observation, reward, terminated, truncated, info = env.step(action)
+        except (ValueError, RoomError) as error:
+            env.restore(self._moments[-1].snapshot)
+            who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
+            raise RefusalError(f"{who}{error}") from None
         tracer.step(action, observation, reward, terminated, truncated, info, thought=thought)
         self._moments.append(
             _Before(env.snapshot(), observation, self._chance.bit_generator.state, terminated or truncated)
@@ -279,13 +304,6 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "check": Session.check,
 }
 """What a window may ask a session for, by name."""
-
-
-def _is_cell(at: Any, room: Mapping[str, int]) -> bool:
-    """Whether this is x and y of a cell of the room."""
-    if not isinstance(at, list) or len(at) != 2 or not all(type(part) is int for part in at):
-        return False
-    return bool(0 <= at[0] < room["width"] and 0 <= at[1] < room["height"])
 
 
 def _policy(run: str, env: Any) -> Any:

@@ -5,17 +5,13 @@ The fork server of these processes imports it once, so that none of them waits f
 
 from pathlib import Path
 
-import socialai_dsl.authoring.server  # noqa: F401
+from socialai_dsl.authoring.templates import TEMPLATES, template_files
 from socialai_dsl.studio.session import Session
+from socialai_dsl.studio.worker import Desk  # noqa: F401
 
-_SMALLEST = """scenario: ready
-horizon: 3
-grammar: {templates: [Say <noun>], nouns: [hello]}
-room: {size: 5}
-cast: {agent: {at: [1, 1]}}
-outcome: [{failure: agent.did(done)}, {success: agent.did(toggle)}]
-"""
-
+# A template, since it has what real scenarios have: NPCs with frames, rules that hear, things and an outcome.
+_name, _text = next(iter(template_files(next(iter(TEMPLATES)), "ready").items()))
 _session = Session()
-_session.draw(str(Path("ready.yaml").resolve()), _SMALLEST)
+_session.draw(str(Path(_name).resolve()), _text)
+_session.prepare()
 _session.act("left")

@@ -5,17 +5,25 @@ A window has two of them: one answers a line of JSON with another, one is the la
 
 from __future__ import annotations
 
-import inspect
+import contextlib
 import json
 import os
 import resource
+import select
 import signal
 import socket
-from collections.abc import Iterable
-from typing import Any, Final, TextIO
+from pathlib import Path
+from typing import Any, Final
+
+from socialai_dsl.authoring.server import make_server
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.studio.files import FileError, Folder
+from socialai_dsl.studio.messages import QUESTIONS, Question, Refused, parsed
+from socialai_dsl.studio.session import ASKED, RefusalError, Session
 
 MOST_BYTES: Final = 4 << 30
 """What a process may hold; a trained agent needs a tenth of it."""
+_IDLE_SECONDS: Final = 0.2
 
 
 def answer_window(connection: socket.socket, root: str) -> None:
@@ -26,54 +34,72 @@ def answer_window(connection: socket.socket, root: str) -> None:
         root: the folder of the scenarios.
     """
     _settle(root)
-    serve(connection.makefile("r", encoding="utf-8"), connection.makefile("w", encoding="utf-8"))
+    desk = Desk(Path(root))
+    with (
+        connection.makefile("r", encoding="utf-8", errors="replace") as questions,
+        connection.makefile("w", encoding="utf-8") as answers,
+    ):
+        while True:
+            if not select.select([connection], [], [], _IDLE_SECONDS)[0]:
+                desk.prepare()
+            line = questions.readline()
+            if not line:
+                return
+            answers.write(desk.answer(line) + "\n")
+            answers.flush()
 
 
 def serve_language(connection: socket.socket, root: str) -> None:
     """Be the language server at this end of a connection; arguments as for `answer_window`."""
-    from socialai_dsl.authoring.server import make_server
-
     _settle(root)
     make_server().start_io(connection.makefile("rb"), connection.makefile("wb"))
 
 
-def serve(questions: Iterable[str], answers: TextIO) -> None:
-    """Answer one line by another.
+class Desk:
+    """Answers a window's questions; whatever they are, it answers the next one, too.
 
-    `{"do": name, ...}` is answered by what the method of `Session` returns, or by `{"refused": why}`.
+    Args:
+        root: the folder of the scenarios.
     """
-    from socialai_dsl.diagnostics import ScenarioError
-    from socialai_dsl.studio.session import RefusalError, Session
 
-    session = Session()
-    for line in questions:
+    def __init__(self, root: Path) -> None:
+        self._folder, self._session = Folder(root), Session()
+
+    def answer(self, line: str) -> str:
+        """The answer to a line of JSON, which is a `Question`: an `Answer`, as JSON."""
+        question = parsed(QUESTIONS, line)
+        if isinstance(question, Refused):
+            return question.model_dump_json()
         try:
-            reply = answer(session, json.loads(line))
-        except RefusalError as refusal:
-            reply = {"refused": str(refusal)}
+            reply = {"id": question.id, "do": question.do, **self._reply(question)}
+            return json.dumps(reply, allow_nan=False)
+        except (RefusalError, FileError) as refusal:
+            why, lost = str(refusal), False
         except ScenarioError as error:
-            reply = {"refused": str(error.diagnostics[0].text)}
+            why, lost = error.diagnostics[0].text, False
         except MemoryError:
-            reply = {"refused": f"this needs more than {MOST_BYTES >> 30} GiB of memory"}
-        print(json.dumps(reply), file=answers, flush=True)
+            why, lost = f"this needs more than {MOST_BYTES >> 30} GiB of memory", True
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            why, lost = f"the engine has failed and begins anew; please report it: {said[:1000]}", True
+        if lost:
+            self._session = Session()
+        return Refused(id=question.id, refused=why, lost=lost).model_dump_json()
 
+    def prepare(self) -> None:
+        """Do what the next question would otherwise wait for."""
+        with contextlib.suppress(
+            Exception
+        ):  # what fails now fails again when it is asked for, and is told then
+            self._session.prepare()
 
-def answer(session: Any, asked: dict[str, Any]) -> dict[str, Any]:
-    """A session's answer to a question.
-
-    Raises:
-        RefusalError: it is none, or cannot be done.
-    """
-    from socialai_dsl.studio.session import ASKED, RefusalError
-
-    method = ASKED.get(str(asked.pop("do", "")))
-    if method is None:
-        raise RefusalError("got a question that there is no answer to")
-    try:
-        inspect.signature(method).bind(session, **asked)
-    except TypeError as error:
-        raise RefusalError(f"got a question that is not complete: {error}") from None
-    return method(session, **asked)
+    def _reply(self, question: Question) -> dict[str, Any]:
+        more = question.model_dump(exclude={"id", "do"})
+        if "path" in more:
+            more["path"] = str(self._folder.path(more["path"]))
+        if "player" in more:
+            more["player"] = self._folder.player(more["player"])
+        return ASKED[question.do](self._session, **more)
 
 
 def _settle(root: str) -> None:

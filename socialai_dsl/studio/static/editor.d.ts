@@ -4,7 +4,7 @@ export class Editor {
     root: string; language: string; nonce: string; changed: (text: string) => void; save: () => void;
   });
   readonly text: string;
-  open(name: string, text: string, anew?: boolean): void;
+  open(name: string, text: string): void;
   replace(text: string): void;
   goTo(line: number): void;
 }

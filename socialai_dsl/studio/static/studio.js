@@ -7,18 +7,41 @@ import { Episode, slotsOf } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
 
-const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
+const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450, TRY_EVERY = 1000;
+const LARGEST_MESSAGE = 2 << 20;
+const LOST = "the connection to the studio was lost; what you type stays in this window, which goes on when `socialai studio` runs again at this address";
 /** @type {Record<string, string>} */
 const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
   t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
 const token = new URLSearchParams(location.search).get("token") ?? "";
 const address = (/** @type {string} */ name) => `ws://${location.host}/${name}?token=${encodeURIComponent(token)}`;
 
-/** Questions to the server, answered in order. */
+/** The name of this window, which outlives it being loaded again; a browser that keeps nothing gives it another one. */
+const own = {
+  /** @returns {string | null} */
+  get() {
+    try {
+      const name = sessionStorage.getItem("window");
+      return name && /^[0-9a-f]{16}$/.test(name) ? name : null;
+    } catch {
+      return null;
+    }
+  },
+  /** @param {string} name */
+  set(name) {
+    try {
+      sessionStorage.setItem("window", name);
+    } catch {}
+  },
+};
+
+/** Questions to the server; those about files and those about the game are answered in order. */
 class Line {
-  /** @param {(open: boolean) => void} changed told when the connection opens or is lost */
-  constructor(changed) {
+  /** @param {(open: boolean, why: string) => void} changed told when the connection opens or is lost, and why
+   * @param {(said: string) => void} told what the server says without being asked */
+  constructor(changed, told) {
     this.changed = changed;
+    this.told = told;
     this.number = 0;
     /** @type {Map<number, (reply: Reply) => void>} */ this.waiting = new Map();
     this.connect();
@@ -26,25 +49,35 @@ class Line {
 
   connect() {
     this.socket = new WebSocket(address("session"));
-    this.socket.onopen = () => this.changed(true);
+    this.socket.onopen = () => this.greet();
     this.socket.onmessage = (event) => {
-      const reply = JSON.parse(event.data);
-      this.waiting.get(reply.id)?.(reply);
+      const reply = JSON.parse(event.data), answer = this.waiting.get(reply.id);
       this.waiting.delete(reply.id);
+      if (answer) answer(reply);
+      else if (reply.refused) this.told(reply.refused);
     };
-    this.socket.onclose = () => {
+    this.socket.onclose = (event) => {
       for (const answer of this.waiting.values()) answer({ refused: "the connection was lost", lost: true });
       this.waiting.clear();
-      this.changed(false);
-      setTimeout(() => this.connect(), 1000);
+      this.changed(false, event.reason || LOST);
+      setTimeout(() => this.connect(), TRY_EVERY);
     };
+  }
+
+  /** Say which window this is, by a name that stays when it is loaded again, so that it finds its drafts. */
+  async greet() {
+    const known = await this.ask("hello", { window: own.get() });
+    if (known.refused) return;
+    own.set(known.window);
+    this.changed(true, "");
   }
 
   /** @param {string} name @param {Reply} more @returns {Promise<Reply>} */
   ask(name, more = {}) {
     if (this.socket?.readyState !== WebSocket.OPEN) return Promise.resolve({ refused: "there is no connection", lost: true });
-    const id = ++this.number;
-    this.socket.send(JSON.stringify({ id, do: name, ...more }));
+    const id = ++this.number, message = JSON.stringify({ id, do: name, ...more });
+    if (message.length > LARGEST_MESSAGE) return Promise.resolve({ refused: "the text is too large for the studio" });
+    this.socket.send(message);
     return new Promise((resolve) => this.waiting.set(id, resolve));
   }
 }
@@ -122,6 +155,8 @@ class Studio {
     this.parts = [this.stage, ...Object.values(parts)];
     this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
     this.state = make("output", { class: "quiet", "aria-live": "polite" });
+    /** @type {Reply[]} drafts that no window shows */ this.others = [];
+    this.kept = make("button", { onclick: () => this.offerDrafts(), hidden: true });
     this.findings = make("ul", { class: "findings", "aria-label": "findings" });
     this.message = make("p", { class: "message", role: "status" });
     this.title = make("h1", {}, "studio");
@@ -145,7 +180,7 @@ class Studio {
     document.body.replaceChildren(this.root);
     const nonce = document.querySelector("meta[name=style-nonce]")?.getAttribute("content") ?? "";
     this.editor = new Editor(this.pane, { root, language: address("language"), nonce, changed: () => this.typedText(), save: () => this.save() });
-    this.line = new Line((open) => this.connected(open));
+    this.line = new Line((open, why) => this.connected(open, why), (said) => this.tell(said));
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("resize", () => this.show());
     addEventListener("pagehide", () => this.keep());
@@ -157,7 +192,7 @@ class Studio {
   layout(parts) {
     const button = (/** @type {string} */ text, /** @type {() => void} */ act, title = text) => make("button", { onclick: act, title }, text);
     const bar = make("header", {}, this.title, this.files, button("New…", () => this.offer(), "a template, or a copy of a shipped scenario"),
-      button("Save", () => this.save(), "Ctrl-S"), this.state,
+      button("Save", () => this.save(), "Ctrl-S"), this.state, this.kept,
       make("span", { class: "filler" }),
       button("Replay", () => this.export("replay"), "save this episode as a page of its own"),
       button("◐", () => this.shade(), "light or dark"));
@@ -181,17 +216,16 @@ class Studio {
       make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
   }
 
-  /** @param {boolean} open */
-  async connected(open) {
+  /** @param {boolean} open @param {string} why */
+  async connected(open, why) {
     document.body.classList.toggle("offline", !open);
-    if (!open) {
-      this.tell("the connection to the studio was lost; what you type stays here, and is drawn again when it is back");
-      return;
-    }
-    this.tell("");
+    this.tell(why);
+    if (!open) return;
     await this.list();
-    if (this.name) this.draw();
-    else await this.openFile(this.first || this.files.value);
+    if (this.name) {
+      await this.keep();
+      this.draw();
+    } else await this.openFile(this.first || this.files.value);
   }
 
   async list() {
@@ -206,29 +240,35 @@ class Studio {
 
   // -- the text --------------------------------------------------------------------------------------------------
 
-  /** @param {string} name @param {boolean} anew */
-  async openFile(name, anew = false) {
+  /** @param {string} name */
+  async openFile(name) {
     if (!name) return;
-    clearTimeout(this.later.keep);
-    if (this.dirty && this.name && !anew) await this.keep();
-    const found = await this.line.ask("read", { name });
-    if (found.refused) {
-      this.tell(found.refused);
+    const stay = (/** @type {string} */ said) => {
+      this.tell(said);
       this.files.value = this.name;
-      return;
+    };
+    if (this.name && name !== this.name) {
+      const kept = await this.keep();
+      if (kept.refused && this.dirty) return stay(`what you have typed cannot be kept: ${kept.refused}`);
     }
-    const same = name === this.name;
-    Object.assign(this, { name, digest: found.digest, saved: found.text, seed: same ? this.seed : 0 });
+    const found = await this.line.ask("read", { name });
+    if (found.refused) return stay(found.refused);
+    const same = name === this.name, back = found.draft !== null;
+    // A draft is saved against the file that it was begun with, so that what was saved since is not written over unseen.
+    Object.assign(this, { name, digest: back ? found.base : found.digest, saved: found.text, seed: same ? this.seed : 0 });
     this.files.value = name;
     document.title = this.title.textContent = name;
     this.players.value = "me";
-    this.editor.open(name, found.text, anew);
-    if (found.draft !== null && found.draft !== this.editor.text) {
-      this.editor.replace(found.draft);
-      this.tell("what you had typed and not saved is here again; Ctrl-Z takes it back");
-    }
+    this.editor.open(name, found.text);
+    const before = this.editor.text, shown = back ? found.draft : found.text;
+    if (before !== shown) this.editor.replace(shown);
     this.mark();
-    this.draw();
+    if (this.dirty) this.state.textContent = "not saved; a draft is kept";
+    this.showOthers(found.others);
+    await this.draw();
+    const since = back && found.base !== found.digest ? ", and the file was changed elsewhere since: saving asks first" : "";
+    if (back && before !== shown) this.tell(`what you had typed and not saved is here again${since}; Ctrl-Z takes it back`);
+    else if (found.elsewhere) this.tell("another window has typed into this file and not saved; each window keeps its own draft");
   }
 
   typedText() {
@@ -243,40 +283,84 @@ class Studio {
   /** Say whether the file holds what is written. */
   mark() {
     this.dirty = this.editor.text !== this.saved;
-    this.state.textContent = this.dirty ? "not saved; a draft is kept" : "saved";
+    this.state.textContent = this.dirty ? "not saved" : "saved";
   }
 
+  /** Keep what was typed as this window's draft. */
   async keep() {
-    if (!this.name) return;
-    const done = await this.line.ask("draft", { name: this.name, text: this.dirty ? this.editor.text : null });
-    if (done.refused && this.dirty) this.state.textContent = `not saved; ${done.refused}`;
+    clearTimeout(this.later.keep);
+    const { name, digest, dirty } = this, { text } = this.editor;
+    if (!name) return {};
+    const done = await this.line.ask("draft", { name, text: dirty ? text : null, base: digest });
+    if (name === this.name && text === this.editor.text && this.dirty) this.state.textContent = done.refused ? `not saved; ${done.refused}` : "not saved; a draft is kept";
+    return done;
   }
 
-  async save() {
+  async save(over = false) {
     clearTimeout(this.later.keep);
-    const text = this.editor.text, done = await this.line.ask("save", { name: this.name, text, digest: this.digest });
+    const { name, digest } = this, { text } = this.editor, done = await this.line.ask("save", { name, text, digest, over });
     if (done.conflict) this.conflict(done.refused);
     else if (done.refused) this.tell(done.refused);
-    else {
-      this.digest = done.digest;
-      this.saved = text;
+    else if (name === this.name) {
+      Object.assign(this, { digest: done.digest, saved: text });
       this.mark();
+      if (this.dirty) this.keep();
     }
+    return !done.refused;
   }
 
   /** @param {string} said */
   conflict(said) {
-    this.ask(said, [
-      ["Keep mine, and write over it", async () => {
-        this.digest = (await this.line.ask("read", { name: this.name })).digest;
-        await this.save();
-      }],
+    this.ask(`${said}. Nothing is lost: what you write over is kept as a draft, and Ctrl-Z brings back what you give up.`, [
+      ["Keep mine, and write over it", async () => (await this.save(true)) && this.look()],
       ["Open theirs", async () => {
-        await this.line.ask("draft", { name: this.name, text: null });
-        await this.openFile(this.name, true);
+        const found = await this.line.ask("read", { name: this.name, adopt: false });
+        if (found.refused) return this.tell(found.refused);
+        Object.assign(this, { digest: found.digest, saved: found.text });
+        this.editor.replace(found.text);
+        this.mark();
+        this.draw();
       }],
       ["Neither, for now", () => {}],
     ]);
+  }
+
+  /** Look which drafts there are besides this window's. */
+  async look() {
+    const found = await this.line.ask("read", { name: this.name, adopt: false });
+    if (!found.refused) this.showOthers(found.others);
+  }
+
+  /** @param {Reply[]} others */
+  showOthers(others) {
+    this.others = others;
+    this.kept.hidden = !others.length;
+    this.kept.textContent = others.length === 1 ? "Another draft…" : `${others.length} other drafts…`;
+  }
+
+  /** Drafts of windows that were closed, and what was written over. */
+  offerDrafts() {
+    const { name } = this;
+    /** @type {[string, () => void][]} */ const answers = [];
+    for (const { draft, time, lines } of this.others) {
+      const which = `the draft of ${new Date(1000 * time).toLocaleString()}, ${lines} lines`;
+      answers.push([`Open ${which}`, async () => {
+        await this.keep();
+        const taken = await this.line.ask("take", { name, draft });
+        if (taken.refused) return this.tell(taken.refused);
+        this.digest = taken.base;
+        this.editor.replace(taken.text);
+        this.mark();
+        await this.keep();
+        await this.look();
+      }]);
+      answers.push([`Delete ${which}`, async () => {
+        const done = await this.line.ask("discard", { name, draft });
+        if (done.refused) this.tell(done.refused);
+        await this.look();
+      }]);
+    }
+    this.ask(`What was typed into ${name} in windows that are closed, or was written over, is kept until you delete it. Opening a draft keeps what you have typed here as another one.`, [...answers, ["Close", () => {}]]);
   }
 
   /** @param {string} text @param {[string, () => void][]} answers @param {...Node} more */
@@ -286,7 +370,7 @@ class Studio {
       act();
     };
     this.dialog.replaceChildren(make("p", {}, text), ...more, make("div", { class: "controls" }, ...answers.map(([word, act]) => make("button", { onclick: close(act) }, word))));
-    this.dialog.showModal();
+    if (!this.dialog.open) this.dialog.showModal();
   }
 
   /** New scenarios: templates, and copies of shipped ones. */

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import io
-import json
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.studio.session import RefusalError, Session
-from socialai_dsl.studio.worker import answer, serve
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
@@ -109,35 +108,44 @@ def test_a_thing_is_put_elsewhere_and_the_layout_can_be_used(session: Session) -
         ("wizard", before["liar"]["at"]),
         ("wizard", [99, 0]),
         ("nobody", free),
-        ("wizard", ["a", 1]),
+        ("wizard[²]", free),
     ):
         with pytest.raises(RefusalError):
             session.place(who, at)
     assert session.layout()["layout"]["wizard"]["at"] == free
 
 
-def test_questions_that_are_none(session: Session) -> None:
-    for question in ({"do": "explode"}, {"do": "act", "wrong": 1}, {}):
-        with pytest.raises(RefusalError):
-            answer(session, dict(question))
-    with pytest.raises(RefusalError):
-        session.begin(-1)
-    with pytest.raises(RefusalError):
+def test_steps_that_were_not_taken_cannot_be_taken_back(session: Session) -> None:
+    with pytest.raises(RefusalError, match="there are 0 steps"):
         session.back(99)
 
 
-def test_a_process_answers_line_by_line(path: Path) -> None:
-    questions: list[dict[str, Any]] = [
-        {"do": "draw", "path": str(path), "text": path.read_text()},
-        {"do": "act", "movement": "forward"},
-        {"do": "nothing"},
-    ]
-    answers = io.StringIO()
-    serve(io.StringIO("".join(json.dumps(one) + "\n" for one in questions)), answers)
-    drawn, acted, refused = [json.loads(line) for line in answers.getvalue().splitlines()]
-    assert drawn["trace"]["format"] == "socialai-trace/1"
-    assert acted["more"]["moments"][0]["did"] == "forward"
-    assert "refused" in refused
+def test_preparing_the_first_step_changes_nothing(path: Path) -> None:
+    played = []
+    for prepares in (False, True):
+        session = Session()
+        session.draw(str(path), path.read_text(), 3)
+        for player in ("me", "script", "random"):
+            session.begin(5, player)
+            if prepares:
+                session.prepare()
+            played.append(
+                [session.act("forward"), session.act(line="How are you"), session.auto(), session.layout()]
+            )
+    assert played[:3] == played[3:]
+
+
+def test_a_script_that_does_what_cannot_be_done_is_told_and_the_game_goes_on(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.begin(3, "script")
+    session.auto()
+    with monkeypatch.context() as patched:
+        patched.setattr(ScenarioEnv, "scripted_action", lambda self: np.array([-1, 0, 0, 0]))
+        for _ in range(2):
+            with pytest.raises(RefusalError, match="script chose what cannot be done: step: got the action"):
+                session.auto()
+    assert session.auto()["more"]["moments"][0]["t"] == 2
 
 
 @pytest.mark.parametrize("base", ["../secret.yaml", "link.yaml"])

@@ -1,0 +1,57 @@
+"""The address of a folder's studio, remembered so that a page that is open finds it again after a new start."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from socialai_dsl.atomic import write_text
+
+
+class Address(BaseModel):
+    """What a page has to know: the token, and the port that was listened at."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    token: Annotated[str, Field(pattern="^[A-Za-z0-9_-]{32}$")]
+    port: Annotated[int, Field(ge=1, lt=1 << 16)]
+
+
+def remembered(root: Path, host: str) -> Address | None:
+    """The former address of a folder's studio; None without one that nobody else could read."""
+    file = _file(root, host)
+    try:
+        descriptor = os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(descriptor, "rb") as stream:
+            found = os.fstat(descriptor)
+            private = stat.S_ISREG(found.st_mode) and not found.st_mode & 0o077
+            if not private or found.st_uid != os.geteuid():
+                return None
+            return Address.model_validate_json(stream.read(1000))
+    except (OSError, ValidationError):
+        return None
+
+
+def remember(root: Path, host: str, address: Address) -> None:
+    """Remember an address for this user alone; where that cannot be done the next start has a new one."""
+    file = _file(root, host)
+    with suppress(OSError):
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        os.fchmod(descriptor, 0o600)
+        os.close(descriptor)
+        write_text(file, address.model_dump_json())  # which keeps these permissions
+
+
+def _file(root: Path, host: str) -> Path:
+    """Where an address is kept: with the state of this user's programs, not in the folder, which may be given away."""
+    state = os.environ.get("XDG_STATE_HOME") or ""
+    home = Path(state) if os.path.isabs(state) else Path(os.path.expanduser("~")) / ".local" / "state"
+    name = hashlib.sha256(f"{host} {root}".encode(errors="surrogateescape")).hexdigest()[:32]
+    return home / "socialai" / "studio" / f"{name}.json"

@@ -1,0 +1,120 @@
+"""What a window asks about files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from socialai_dsl.authoring.templates import TEMPLATES, template_files
+from socialai_dsl.loader.shipped import file_of, shipped_scenarios, variants_of
+from socialai_dsl.studio import messages
+from socialai_dsl.studio.drafts import Draft
+from socialai_dsl.studio.files import FileError, Folder
+
+
+class Filing:
+    """The folder, as one window uses it.
+
+    Args:
+        folder: the folder.
+        window: which window it is.
+        live: the windows that are open.
+    """
+
+    def __init__(self, folder: Folder, window: str, live: frozenset[str]) -> None:
+        self._folder, self._window, self._live = folder, window, live
+
+    def answer(self, asked: Any) -> dict[str, Any]:
+        """The answer to a message about files.
+
+        Raises:
+            FileError: it cannot be done.
+        """
+        return _ANSWERS[type(asked)](self, asked)
+
+    def _list(self, asked: messages.List) -> dict[str, Any]:
+        del asked
+        return {
+            "files": self._folder.scenarios(),
+            "runs": self._folder.players(),
+            "shipped": shipped_scenarios(),
+            "templates": TEMPLATES,
+        }
+
+    def _read(self, asked: messages.Read) -> dict[str, Any]:
+        found = self._folder.open(asked.name, self._window, self._live, asked.adopt)
+        return {
+            "text": found.text,
+            "digest": found.digest,
+            "draft": found.draft.text if found.draft else None,
+            "base": found.draft.base if found.draft else None,
+            "others": [{"draft": one.window, "time": one.time, "lines": _lines(one)} for one in found.others],
+            "elsewhere": found.elsewhere,
+        }
+
+    def _save(self, asked: messages.Save) -> dict[str, Any]:
+        known = self._folder.write(asked.name, asked.text, asked.digest, self._window, asked.over)
+        return {"digest": known}
+
+    def _keep_draft(self, asked: messages.KeepDraft) -> dict[str, Any]:
+        if asked.text is None:
+            self._folder.forget_draft(asked.name, self._window)
+        else:
+            self._folder.keep_draft(asked.name, asked.text, asked.base, self._window)
+        return {}
+
+    def _take_draft(self, asked: messages.TakeDraft) -> dict[str, Any]:
+        taken = self._folder.take_draft(asked.name, asked.draft, self._window, self._live)
+        return {"text": taken.text, "base": taken.base}
+
+    def _discard_draft(self, asked: messages.DiscardDraft) -> dict[str, Any]:
+        self._folder.discard_draft(asked.name, asked.draft, self._live)
+        return {}
+
+    def _copy(self, asked: messages.Copy) -> dict[str, Any]:
+        shipped = asked.shipped
+        if shipped not in shipped_scenarios():
+            raise FileError(f"{shipped[:80]!a}: there is no such shipped scenario")
+        name = self._create_file(f"{shipped}.yaml", file_of(shipped).read_text(encoding="utf-8"))
+        if "oracle" in variants_of(shipped):
+            script = file_of(shipped, "oracle")
+            stem = name.removesuffix(".yaml")
+            if script.stem != "oracle":
+                text = script.read_text(encoding="utf-8")
+                self._create_file(f"{stem}_oracle.yaml", text.replace(f"of: {shipped}\n", f"of: {stem}\n"))
+        return {"name": name}
+
+    def _create(self, asked: messages.Create) -> dict[str, Any]:
+        template, called = asked.template, asked.called
+        if template not in TEMPLATES or not (called.isascii() and called.isidentifier()):
+            known = ", ".join(TEMPLATES)
+            raise FileError(f"{called[:80]!a}: expected a word of letters, digits and _, and one of {known}")
+        files = template_files(template, called)
+        taken = [path.name for path in files if self._folder.is_taken(path.name)]
+        if taken:
+            raise FileError(f"{taken[0]} exists already")
+        names = [self._create_file(path.name, text) for path, text in files.items()]
+        return {"name": names[0]}
+
+    def _add(self, asked: messages.Add) -> dict[str, Any]:
+        return {"name": self._create_file(asked.name, asked.text)}
+
+    def _create_file(self, name: str, text: str) -> str:
+        return self._folder.create(name, text, self._window)
+
+
+def _lines(draft: Draft) -> int:
+    return len(draft.text.splitlines())
+
+
+_ANSWERS: Final[Mapping[type, Callable[[Filing, Any], dict[str, Any]]]] = {
+    messages.List: Filing._list,
+    messages.Read: Filing._read,
+    messages.Save: Filing._save,
+    messages.KeepDraft: Filing._keep_draft,
+    messages.TakeDraft: Filing._take_draft,
+    messages.DiscardDraft: Filing._discard_draft,
+    messages.Copy: Filing._copy,
+    messages.Create: Filing._create,
+    messages.Add: Filing._add,
+}

@@ -1,0 +1,395 @@
+"""The messages between a window, the server and the window's process, checked where they arrive.
+
+A window asks with a number `id` and a word `do`. A question about its game goes to its process as it is, and the answer
+comes back as it is: with the same number and word, or with the word `refused` and a sentence for the person at the
+screen.
+"""
+
+from __future__ import annotations
+
+import re
+from reprlib import Repr
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from socialai_dsl.replay.document import Trace
+
+LARGEST_MESSAGE: Final = 2 << 20
+"""Characters of a message from a window; longer ones are refused."""
+
+_Number = Annotated[int, Field(ge=0, le=(1 << 53) - 1)]
+_Seed = Annotated[int, Field(ge=0, lt=1 << 63)]
+_Word = Annotated[str, Field(max_length=2_000)]
+WindowId = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    id: _Number
+
+
+# -- what a window asks its process -----------------------------------------------------------------------------------
+
+
+class Draw(_Message):
+    """Check a text that is to stand in the file `path`, and draw its room."""
+
+    do: Literal["draw"]
+    path: _Word
+    text: str
+    seed: _Seed = 0
+
+
+class Begin(_Message):
+    """Begin an episode; `player` is `me`, `script`, `random`, `shipped:NAME` or the folder of a run."""
+
+    do: Literal["begin"]
+    seed: _Seed = 0
+    player: _Word = "me"
+
+
+class Act(_Message):
+    """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
+
+    do: Literal["act"]
+    movement: _Word | None = None
+    sentence: _Word | None = None
+    line: _Word | None = None
+
+
+class Auto(_Message):
+    """Let the chosen player play a step."""
+
+    do: Literal["auto"]
+
+
+class Back(_Message):
+    """Take steps back until `to` of them are left."""
+
+    do: Literal["back"]
+    to: _Number
+
+
+class Place(_Message):
+    """Begin again in the same room with one thing in another cell."""
+
+    do: Literal["place"]
+    who: _Word
+    at: tuple[_Number, _Number]
+
+
+class Layout(_Message):
+    """Describe the room as it is now."""
+
+    do: Literal["layout"]
+
+
+class WriteLayout(_Message):
+    """Write the room as it is now into the text, as the start of every episode."""
+
+    do: Literal["write_layout"]
+    text: str
+
+
+class Replay(_Message):
+    """Make a page of the episode so far."""
+
+    do: Literal["replay"]
+
+
+class Check(_Message):
+    """Check the claims of a text that is to stand in the file `path`."""
+
+    do: Literal["check"]
+    path: _Word
+    text: str
+
+
+Question = Annotated[
+    Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check,
+    Field(discriminator="do"),
+]
+QUESTIONS: Final[TypeAdapter[Question]] = TypeAdapter(Question)
+"""What a process is asked."""
+
+
+# -- what a window asks the server ------------------------------------------------------------------------------------
+
+
+class Hello(_Message):
+    """Say which window this was before the connection was lost; the answer says which it is now."""
+
+    do: Literal["hello"]
+    window: WindowId | None
+
+
+class List(_Message):
+    """List the files, players and templates."""
+
+    do: Literal["list"]
+
+
+class Read(_Message):
+    """Read a file and its drafts.
+
+    Attributes:
+        adopt: go on with what was typed last in a window that is closed.
+    """
+
+    do: Literal["read"]
+    name: _Word
+    adopt: bool = True
+
+
+class Save(_Message):
+    """Save a file.
+
+    Attributes:
+        digest: of what the file held when this window read it; None for a new file.
+        over: write over what another window or program has saved since, and keep that as a draft.
+    """
+
+    do: Literal["save"]
+    name: _Word
+    text: str
+    digest: _Word | None
+    over: bool = False
+
+
+class KeepDraft(_Message):
+    """Keep what was typed into a file, or with None forget it.
+
+    Attributes:
+        base: digest of the file that the typing began with; None for a new file.
+    """
+
+    do: Literal["draft"]
+    name: _Word
+    text: str | None
+    base: _Word | None = None
+
+
+class TakeDraft(_Message):
+    """Go on with another draft of a file; this window's own is kept in its place."""
+
+    do: Literal["take"]
+    name: _Word
+    draft: WindowId
+
+
+class DiscardDraft(_Message):
+    """Delete a draft of a window that is closed."""
+
+    do: Literal["discard"]
+    name: _Word
+    draft: WindowId
+
+
+class Copy(_Message):
+    """Copy a shipped scenario with its script into the folder."""
+
+    do: Literal["copy"]
+    shipped: _Word
+
+
+class Create(_Message):
+    """Write the files of a template under a name."""
+
+    do: Literal["create"]
+    template: _Word
+    called: _Word
+
+
+class Add(_Message):
+    """Add a file, under the next free name."""
+
+    do: Literal["add"]
+    name: _Word
+    text: str
+
+
+FileQuestion = Hello | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add
+WINDOW_QUESTIONS: Final[TypeAdapter[Any]] = TypeAdapter(
+    Annotated[
+        Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check | FileQuestion,
+        Field(discriminator="do"),
+    ]
+)
+"""What a window may ask."""
+
+
+# -- what a process answers -------------------------------------------------------------------------------------------
+
+
+class Refused(_Message):
+    """Something cannot be done.
+
+    Attributes:
+        id: None where the question had no number that could be read.
+        refused: why, for the person at the screen.
+        conflict: the file was changed elsewhere. lost: the game is gone, and its room is to be drawn again.
+    """
+
+    id: _Number | None  # type: ignore[assignment]
+    do: Literal["refused"] = "refused"
+    refused: str
+    conflict: bool = False
+    lost: bool = False
+
+
+class Finding(BaseModel):
+    """A finding in the text, at a line and column from 1."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    line: int
+    column: int
+    message: str
+    code: str
+    error: bool
+
+
+class _Begun(_Message):
+    trace: Trace
+    phrases: dict[str, list[str]]
+    rules: list[str]
+    player: str
+    seed: int
+
+
+class Drawn(_Message):
+    """Findings, and the game's beginning unless there are errors."""
+
+    do: Literal["draw"]
+    findings: list[Finding]
+    refused: str | None = None
+    trace: Trace | None = None
+    phrases: dict[str, list[str]] | None = None
+    rules: list[str] | None = None
+    player: str | None = None
+    seed: int | None = None
+
+
+class Begun(_Begun):
+    """The beginning of an episode."""
+
+    do: Literal["begin"]
+
+
+class Placed(_Begun):
+    """The beginning of an episode, and the layout that leads to it."""
+
+    do: Literal["place"]
+    layout: dict[str, Any]
+
+
+class Stepped(_Message):
+    """What a step adds to the trace."""
+
+    do: Literal["act", "auto"]
+    more: Trace
+
+
+class WentBack(_Message):
+    """How many steps are left."""
+
+    do: Literal["back"]
+    length: int
+
+
+class LayoutOf(_Message):
+    """The room as a layout."""
+
+    do: Literal["layout"]
+    layout: dict[str, Any]
+
+
+class WrittenLayout(_Message):
+    """The text of the suite, or of a new suite with its file's name."""
+
+    do: Literal["write_layout"]
+    text: str | None = None
+    suite: str | None = None
+    name: str | None = None
+
+
+class Page(_Message):
+    """A page of an episode."""
+
+    do: Literal["replay"]
+    page: str
+
+
+class Checked(_Message):
+    """The lines that `socialai check` prints."""
+
+    do: Literal["check"]
+    lines: list[str]
+
+
+Answer = Annotated[
+    Refused | Drawn | Begun | Placed | Stepped | WentBack | LayoutOf | WrittenLayout | Page | Checked,
+    Field(discriminator="do"),
+]
+ANSWERS: Final[TypeAdapter[Answer]] = TypeAdapter(Answer)
+"""What a process answers."""
+
+
+# -- what is no message -----------------------------------------------------------------------------------------------
+
+
+class _Numbered(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    id: _Number
+
+
+_short: Final = Repr()
+_short.maxstring, _short.maxother = 60, 60
+_BEGINS_WITH: Final = re.compile(r'\s*\{\s*"id"\s*:\s*([0-9]{1,15})\s*[,}]')
+
+
+def parsed(adapter: TypeAdapter[Any], text: str) -> Any:
+    """The message of a union that a text is, or `Refused`."""
+    if len(text) > LARGEST_MESSAGE:
+        why = f"got a message of {len(text)} characters, expected at most {LARGEST_MESSAGE}"
+        return Refused(id=_first_number(text), refused=why)
+    try:
+        return adapter.validate_json(text)
+    except ValidationError as error:
+        return Refused(id=_number(text), refused=problem(error))
+
+
+def _number(text: str) -> int | None:
+    """The number of a question that is to be refused; None where it has none."""
+    try:
+        return _Numbered.model_validate_json(text).id
+    except ValidationError:
+        return _first_number(text)
+
+
+def _first_number(text: str) -> int | None:
+    """The number that a text begins with, which is not to be read further."""
+    found = _BEGINS_WITH.match(text)
+    return int(found[1]) if found else None
+
+
+def problem(error: ValidationError) -> str:
+    """The first thing that is wrong with a message, in one sentence."""
+    first = error.errors(include_url=False, include_context=False)[0]
+    # The first part of a place is the word of the message, which the union has told it by.
+    place = ".".join(str(part) for part in first["loc"][1:])
+    said = first["msg"][:1].lower() + first["msg"][1:]
+    if first["type"] == "union_tag_not_found":
+        return "got a message without the word `do`"
+    if first["type"] == "union_tag_invalid":
+        return f"got {_short.repr(first['input'].get('do'))} as `do`, which nobody can be asked for"
+    if first["type"] == "missing":
+        return f"got a message without `{place}`"
+    if first["type"] == "extra_forbidden":
+        return f"got a message with the key {_short.repr(place)}, which it does not have"
+    if not place:
+        return f"got a message that cannot be read: {said[:300]}"
+    return f"`{place[:60]}`: got {_short.repr(first['input'])}; {said[:300]}"
