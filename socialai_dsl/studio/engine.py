@@ -62,17 +62,15 @@ async def start_worker(run: Callable[[socket.socket, str], None], root: Path) ->
     """
     starting = asyncio.get_running_loop().run_in_executor(None, _start, run, root)
     try:
-        # Shielded, since a start cannot be taken back: whoever does not wait for it any more lets it end afterwards.
-        process, ours = await asyncio.wait_for(asyncio.shield(starting), _START_SECONDS)
-    except (OSError, EOFError):
-        raise EngineLostError("the engine's process could not be started") from None
-    except TimeoutError:
+        async with asyncio.timeout(_START_SECONDS):
+            # Shielded, since a start cannot be taken back: the process is ended when it has started.
+            process, ours = await asyncio.shield(starting)
+            return Worker(process, *await asyncio.open_connection(sock=ours, limit=_LONGEST_ANSWER))
+    except BaseException as error:
         starting.add_done_callback(_drop)
-        raise EngineLostError("the engine's process could not be started in time") from None
-    except asyncio.CancelledError:
-        starting.add_done_callback(_drop)
+        if isinstance(error, OSError | EOFError):
+            raise EngineLostError("the engine's process could not be started") from None
         raise
-    return Worker(process, *await asyncio.open_connection(sock=ours, limit=_LONGEST_ANSWER))
 
 
 def _start(run: Callable[[socket.socket, str], None], root: Path) -> tuple[BaseProcess, socket.socket]:
@@ -139,7 +137,8 @@ class Engine:
                 self._worker = await start_worker(answer_window, self._root)
             try:
                 self._worker.writer.write(question.model_dump_json().encode() + b"\n")
-                line = await asyncio.wait_for(self._worker.reader.readline(), seconds)
+                async with asyncio.timeout(seconds):  # `wait_for` may lose that the window was closed
+                    line = await self._worker.reader.readline()
             except TimeoutError:
                 await self.stop()
                 raise EngineLostError(f"this took longer than {seconds:g} seconds and was stopped") from None

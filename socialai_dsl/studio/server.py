@@ -173,7 +173,7 @@ class Studio:
         """Whether one more window may open; it is told why not."""
         if opened < self._most:
             return True
-        words = f"{self._most} windows are open, the most; close one, or start the studio with more --windows"
+        words = f"as many windows are open as may be ({self._most}); close one, or start the studio with more --windows"
         await close(socket, NO_ROOM, words)
         return False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -21,7 +22,7 @@ from socialai_dsl.cli.main import run_main
 pytest.importorskip("starlette", reason="no test of the studio without the extra `studio`")
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Browser, Page
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KEYS = {
@@ -43,22 +44,29 @@ class Server:
     address: str
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("studio")
-    fill(folder)
-    file = str(folder / "talkitout.yaml")
-    command = [sys.executable, "-m", "socialai_dsl", "studio", file, "--no-browser", "--port", "0"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+@contextmanager
+def served(file: Path, state: Path, *more: str) -> Iterator[str]:
+    """The address of a studio that runs; what it remembers is in `state`."""
+    command = [sys.executable, "-m", "socialai_dsl", "studio", str(file), "--no-browser", *more]
+    environment = {**os.environ, "XDG_STATE_HOME": str(state)}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     assert process.stdout is not None
     try:
         found = re.search(r"http://\S+", process.stdout.readline())
         assert found is not None
-        yield Server(folder, found.group(0))
+        yield found.group(0)
     finally:
         process.terminate()
         process.wait(20)
         process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("studio")
+    fill(folder)
+    with served(folder / "talkitout.yaml", tmp_path_factory.mktemp("state"), "--port", "0") as address:
+        yield Server(folder, address)
 
 
 def fill(folder: Path) -> None:
@@ -80,6 +88,11 @@ def studio(page: Page, server: Server, folder: Path) -> Page:
     page.goto(server.address)
     drawn(page)
     return page
+
+
+def drafts(folder: Path) -> str:
+    """All that is kept as drafts."""
+    return "".join(path.read_text() for path in (folder / ".studio").glob("*.json"))
 
 
 def drawn(page: Page) -> None:
@@ -180,8 +193,7 @@ def test_what_was_not_saved_is_there_after_a_reload(studio: Page, folder: Path) 
     studio.locator(".cm-content").get_by_text("horizon", exact=True).click()
     studio.keyboard.press("End")
     studio.keyboard.type(" # a thought")
-    draft = folder / ".studio" / "talkitout.yaml"
-    until(studio, lambda: draft.exists() and "a thought" in draft.read_text())
+    until(studio, lambda: "a thought" in drafts(folder))
     studio.on("dialog", lambda dialog: dialog.accept())
     studio.reload()
     drawn(studio)
@@ -200,6 +212,81 @@ def test_two_windows_do_not_write_over_each_other(studio: Page, folder: Path) ->
     studio.get_by_role("button", name="Keep mine").click()
     studio.get_by_text("saved", exact=True).wait_for()
     assert "# mine" in (folder / "talkitout.yaml").read_text()
+
+
+def type_at_the_end_of(page: Page, word: str, text: str) -> None:
+    page.locator(".cm-content").get_by_text(word, exact=True).click()
+    page.keyboard.press("End")
+    page.keyboard.type(text)
+    page.get_by_text("not saved; a draft is kept").wait_for()
+
+
+def test_what_each_of_two_windows_has_typed_is_kept(studio: Page, server: Server, folder: Path) -> None:
+    other = studio.context.new_page()
+    other.goto(server.address)
+    drawn(other)
+    type_at_the_end_of(studio, "horizon", " # mine")
+    type_at_the_end_of(other, "horizon", " # theirs")
+    other.keyboard.press("Control+s")
+    other.get_by_text("saved", exact=True).wait_for()
+    studio.on("dialog", lambda dialog: dialog.accept())
+    studio.reload()
+    studio.locator(".cm-content", has_text="# mine").wait_for()
+    studio.get_by_text("the file was changed elsewhere since").wait_for()
+    studio.locator(".cm-content").focus()
+    studio.keyboard.press("Control+s")
+    studio.get_by_text("was changed elsewhere since it was opened here").wait_for()
+    studio.get_by_role("button", name="Keep mine").click()
+    studio.get_by_text("saved", exact=True).wait_for()
+    assert "# mine" in (folder / "talkitout.yaml").read_text()
+    studio.get_by_role("button", name="Another draft").click()
+    studio.get_by_role("button", name="Open the draft of").click()
+    studio.locator(".cm-content", has_text="# theirs").wait_for()
+    studio.get_by_text("not saved; a draft is kept").wait_for()
+    other.close()
+
+
+def test_a_window_that_is_open_goes_on_after_a_new_start(browser: Browser, tmp_path: Path) -> None:
+    folder, state = tmp_path / "folder", tmp_path / "state"
+    folder.mkdir()
+    fill(folder)
+    page = browser.new_page()
+    with served(folder / "talkitout.yaml", state, "--port", "0") as address:
+        page.goto(address)
+        drawn(page)
+    page.get_by_text("the connection to the studio was lost").wait_for()
+    page.locator(".cm-content").get_by_text("horizon", exact=True).click()
+    page.keyboard.press("Home")
+    page.keyboard.type("z")
+    page.get_by_text("not saved; there is no connection").wait_for()
+    with served(folder, state) as again:
+        assert again == address
+        page.locator(".stage.stale").wait_for()
+        until(page, lambda: "zhorizon" in drafts(folder))
+        page.locator(".cm-lintRange-error").first.wait_for()  # the language server is there again, too
+        page.keyboard.press("Backspace")
+        drawn(page)
+        page.keyboard.press("Escape")
+        page.keyboard.press("ArrowUp")
+        reach(page, 1)
+    page.close()
+
+
+def test_one_window_too_many_is_told_and_comes_in_when_another_is_closed(
+    browser: Browser, tmp_path: Path
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    fill(folder)
+    first, second = browser.new_page(), browser.new_page()
+    with served(folder / "talkitout.yaml", tmp_path / "state", "--port", "0", "--windows", "1") as address:
+        first.goto(address)
+        drawn(first)
+        second.goto(address)
+        second.get_by_text("as many windows are open as may be (1); close one").wait_for()
+        first.close()
+        drawn(second)
+    second.close()
 
 
 def test_talkitout_is_played_stepped_back_and_ends_elsewhere(studio: Page, tmp_path: Path) -> None:
@@ -390,8 +477,7 @@ def test_a_window_closed_in_the_middle_of_a_save_loses_nothing(
     studio.locator(".cm-content").get_by_text("horizon", exact=True).click()
     studio.keyboard.press("End")
     studio.keyboard.type(" # typed in haste")
-    draft = folder / ".studio" / "talkitout.yaml"
-    until(studio, lambda: draft.exists() and draft.read_text() == typed)
+    until(studio, lambda: "# typed in haste" in drafts(folder))
     studio.keyboard.press("Control+s")
     studio.close()
     page = studio.context.new_page()
