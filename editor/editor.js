@@ -43,7 +43,7 @@ export class Editor {
     this.options = options;
     /** @type {Map<string, EditorState>} */ this.states = new Map();
     this.name = "";
-    this.client = new LSPClient({ rootUri: uri(options.root), extensions: [serverDiagnostics(), serverCompletion(), hoverTooltips()], timeout: 15000 });
+    this.client = new LSPClient({ rootUri: uri(options.root), extensions: [serverDiagnostics(), serverCompletion(), hoverTooltips()], timeout: 60000 });
     this.view = new EditorView({ parent, extensions: EditorView.cspNonce.of(options.nonce) });
     this.connect();
   }

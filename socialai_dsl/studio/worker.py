@@ -12,6 +12,7 @@ import resource
 import select
 import signal
 import socket
+import threading
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,9 +34,10 @@ def answer_window(connection: socket.socket, root: str) -> None:
         connection: to the server.
         root: the folder of the scenarios.
     """
-    _settle(root)
+    _settle(connection, root)
     desk = Desk(Path(root))
     with (
+        contextlib.suppress(OSError),  # the server is gone
         connection.makefile("r", encoding="utf-8", errors="replace") as questions,
         connection.makefile("w", encoding="utf-8") as answers,
     ):
@@ -51,7 +53,7 @@ def answer_window(connection: socket.socket, root: str) -> None:
 
 def serve_language(connection: socket.socket, root: str) -> None:
     """Be the language server at this end of a connection; arguments as for `answer_window`."""
-    _settle(root)
+    _settle(connection, root)
     make_server().start_io(connection.makefile("rb"), connection.makefile("wb"))
 
 
@@ -102,10 +104,19 @@ class Desk:
         return ASKED[question.do](self._session, **more)
 
 
-def _settle(root: str) -> None:
+def _settle(connection: socket.socket, root: str) -> None:
     """Be a process of this folder, which the server ends and not Ctrl-C, and which cannot fill the machine."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(connection,), daemon=True).start()
     os.chdir(root)
     _, most = resource.getrlimit(resource.RLIMIT_DATA)
     allowed = MOST_BYTES if most == resource.RLIM_INFINITY else min(MOST_BYTES, most)
     resource.setrlimit(resource.RLIMIT_DATA, (allowed, most))
+
+
+def _end_with(connection: socket.socket) -> None:
+    """End this process when the other end is closed, whatever it does then, as the server may have been killed."""
+    other_end = select.poll()
+    other_end.register(connection, 0)
+    other_end.poll()
+    os._exit(0)

@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from pydantic import BaseModel
 
 from socialai_dsl.studio import engine, messages
-from socialai_dsl.studio.engine import Engine, EngineLostError
+from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker
 from socialai_dsl.studio.messages import ANSWERS, QUESTIONS, WINDOW_QUESTIONS, Check, Refused, parsed
 from socialai_dsl.studio.session import ASKED
-from socialai_dsl.studio.worker import Desk
+from socialai_dsl.studio.worker import Desk, answer_window
 from tests.socialai_dsl.studio.hostile import FILES, GAME, answer_wrongly, texts
-from tests.socialai_dsl.studio.processes import wait_until_none_works
+from tests.socialai_dsl.studio.processes import wait_until_none_works, workers
 
 SCENARIO = Path(__file__).parents[3] / "scenarios" / "talkitout.yaml"
 
@@ -162,3 +162,18 @@ def test_a_process_that_answers_wrongly_is_replaced(folder: Path, monkeypatch: p
         await asked.stop()
 
     asyncio.run(ask_all())
+
+
+@pytest.mark.usefixtures("children")
+def test_a_process_ends_with_its_server_whatever_it_does(folder: Path) -> None:
+    async def leave_it_alone() -> None:
+        worker = await start_worker(answer_window, folder)
+        asked = Check(id=1, do="check", path=SCENARIO.name, text=SCENARIO.read_text())
+        worker.writer.write(asked.model_dump_json().encode() + b"\n")
+        await asyncio.sleep(0.5)
+        assert workers()
+        worker.writer.close()  # as the system does for a server that was killed
+        await asyncio.to_thread(wait_until_none_works)
+        await worker.stop()
+
+    asyncio.run(leave_it_alone())

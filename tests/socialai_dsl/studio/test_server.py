@@ -347,7 +347,9 @@ def test_one_window_too_many_is_told_and_opens_when_another_closes(client: Clien
     with client.window(address), client.window(address), ExitStack() as third:
         third.enter_context(client.window(address))
         with (
-            pytest.raises(WebSocketException, match=r"4429.*as many windows are open as may be \(3\); close one"),
+            pytest.raises(
+                WebSocketException, match=r"4429.*as many windows are open as may be \(3\); close one"
+            ),
             client.window(address) as too_many,
         ):
             too_many.recv(30)
@@ -406,7 +408,8 @@ def test_an_address_is_kept_for_the_next_start(tmp_path: Path, monkeypatch: pyte
 def test_a_process_cannot_fill_the_machine() -> None:
     command = (
         "import os, socket\nfrom socialai_dsl.studio.worker import MOST_BYTES, answer_window\n"
-        "ours, theirs = socket.socketpair()\nours.close()\nanswer_window(theirs, os.getcwd())\nbytearray(MOST_BYTES)"
+        "ours, theirs = socket.socketpair()\nours.shutdown(socket.SHUT_WR)\nanswer_window(theirs, os.getcwd())\n"
+        "bytearray(MOST_BYTES)"
     )
     done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, timeout=60)
     assert "MemoryError" in done.stderr
