@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import Final
 
 from socialai_dsl.source import Source, Span
+from socialai_dsl.vocabulary import composed
 
 CODES: Final[dict[str, str]] = {
     # S0xx: the file as text and as YAML
@@ -67,11 +68,14 @@ CODES: Final[dict[str, str]] = {
     "W317": "a definition that nothing uses",
     "S318": "a register that nothing is ever put into",
     "W319": "a condition that always holds",
+    "S320": "an action that the agent does not have",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",
     "W403": "a right answer that is not among those of the probe",
     "W404": "a probe with a single answer",
+    "S405": "a text that is not one line, or a name that reads like two",
+    "W406": "texts that only people tell apart",
     # S5xx: variants, parameters and files that belong together
     "S501": "no such path in the scenario",
     "S502": "an added key that exists already",
@@ -203,17 +207,18 @@ class DiagnosticBag:
 def did_you_mean(word: str, candidates: Iterable[str]) -> str | None:
     """The candidate that `word` is most likely a slip for, or None if none is near.
 
+    It never looks like `word` itself.
     Case, and `-` or a space for `_`, do not count. Up to a quarter of the letters may differ (an exchange of
     neighbours is one difference); a candidate that `word` begins, or that begins `word`, is near as well.
     Inside of `bounded_suggestions` only as many candidates are looked at as its effort allows.
     """
     if not 2 <= len(word) <= _LONGEST_SUGGESTION:
         return None
-    folded = _fold(word)
+    folded, shown = _fold(word), composed(word)
     effort = _effort.get()
     best: tuple[int, int, str] | None = None
     for candidate in candidates:
-        if candidate == word or len(candidate) > _LONGEST_SUGGESTION:
+        if len(candidate) > _LONGEST_SUGGESTION or composed(candidate) == shown:
             continue
         if effort is not None:
             if effort.left <= 0:

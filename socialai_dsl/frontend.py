@@ -208,7 +208,7 @@ def _repeated(first: Diagnostic, others: Sequence[Diagnostic]) -> str:
     return f"the same is in {' and in '.join(where)}" if where else "the same is in this line once more"
 
 
-_SPOKEN: Final = frozenset({"say", "hears", "templates", "nouns", "name"})
+_SPOKEN: Final = frozenset({"say", "hears", "ask", "answers", "templates", "nouns", "name"})
 _GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")
 """A comment whose text begins without a blank, as in `#1`."""
 
@@ -221,7 +221,8 @@ def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
             continue
         key = next((step for step in reversed(path) if isinstance(step, str)), "")
         comment = _GLUED.match(node.source.text, span.end)
-        if comment is None or (key not in _SPOKEN and "with" not in path[-2:-1]):
+        spoken = key in _SPOKEN or "with" in path[-2:-1] or path[:2] == ("grammar", "slots")
+        if comment is None or not spoken:
             continue
         place = span.value.shifted(comment.start(1) - span.start, len(comment[1]))
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"

@@ -6,6 +6,7 @@ A word's number is its place: `COLORS[2]` is `blue`, and 2 in registers and in t
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,17 +38,63 @@ FINISHED: Final = "finished"
 TRUTHS: Final = ("no", "yes")
 """How a truth value is answered."""
 
-_WORD: Final = re.compile(r"(?:[^\W_]|')+")
+_WORD: Final = re.compile(r"[a-z0-9']+")
+_FINAL: Final = ".!?\u3002"
+"""Marks that may end a sentence, the ideographic full stop among them; wide forms of the others are folded."""
+
+_UNSPACED: Final = re.compile(
+    "[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3041-\u30ff\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
+)
+"""Letters of scripts that put no blanks between words: Thai, Lao, Burmese, Khmer, Japanese, Chinese."""
+
+
+def composed(text: str) -> str:
+    """A text as it looks: its letters composed and in plain forms (NFKC), without what cannot be seen."""
+    if text.isascii():
+        return text
+    return "".join(c for c in unicodedata.normalize("NFKC", text) if not _is_unseen(c)).replace("\u2019", "'")
+
+
+def folded(text: str) -> str:
+    """A text as it is compared: as it looks, without case."""
+    return text.lower() if text.isascii() else composed(composed(text).casefold())
+
+
+def _is_unseen(character: str) -> bool:
+    """Whether a character only tells how others are to be shown: joiners, soft hyphens, directions, selectors."""
+    return unicodedata.category(character) == "Cf" or "\ufe00" <= character <= "\ufe0f"
 
 
 def normal(text: str) -> str:
-    """A text as hearing compares it: without case, a final `.`, `!` or `?`, and how many blanks there are."""
-    return " ".join(text.casefold().strip().rstrip(".!?").split())
+    """A text as hearing compares it: folded, without final full stops, `!` or `?`, and how many blanks there are."""
+    text = " ".join(folded(text).split())
+    return text.rstrip(_FINAL).rstrip() or text
+
+
+def first_alike(text: str, known: dict[str, str]) -> str | None:
+    """The first of the known texts that is heard as this one, which is known from now on; None if there is none."""
+    first = known.setdefault(normal(text), text)
+    return None if first is text else first
 
 
 def words(text: str) -> list[str]:
-    """The lower-cased maximal runs of letters, digits and apostrophes."""
-    return _WORD.findall(text.lower())
+    """The folded maximal runs of letters, digits and apostrophes; each letter of a script without blanks by itself."""
+    text = folded(text)
+    if text.isascii():
+        return _WORD.findall(text)
+    found: list[str] = []
+    open_ = False
+    for character in text:
+        mark = unicodedata.category(character)[0] == "M"
+        letter = character.isalnum() or character == "'"
+        if open_ and (
+            mark or (letter and not _UNSPACED.match(character) and not _UNSPACED.match(found[-1][0]))
+        ):
+            found[-1] += character
+        elif letter:
+            found.append(character)
+        open_ = letter or (open_ and mark)
+    return found
 
 
 def spelt(value: object) -> str:

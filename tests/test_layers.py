@@ -39,7 +39,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "folder_lock": (set(), {"filelock"}),
     "run_folder": ({"atomic", "errors", "experiments", "folder_lock"}, {"pydantic", CONFIG}),
     "source": (set(), set()),
-    "diagnostics": ({"source"}, set()),
+    "diagnostics": ({"source", "vocabulary"}, set()),
     "draws": (set(), {"numpy", "numba"}),
     "vocabulary": (set(), set()),
     "grammar": ({"source", "diagnostics", "vocabulary"}, {"lark"}),

@@ -100,6 +100,15 @@ def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[
     given = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
     for name, part, shape in zip(Lead._fields, given, (own.shape, own.shape[:1], own.shape[:1]), strict=True):
         require_shape(f"guide: {name} of lead", part, tuple(shape))
+    sizes = session.envs.single_action_space.nvec
+    asked = given.led | (given.weights != 0)
+    outside = np.flatnonzero(asked & ((given.actions < 0) | (given.actions >= sizes)).any(axis=1))
+    if len(outside):
+        row = int(outside[0])
+        raise ValueError(
+            f"guide: got the action {given.actions[row].tolist()} in row {row}, "
+            f"expected numbers from 0 to below {sizes.tolist()}"
+        )
     state.led |= given.led
     lead = Lead(*(move(part.copy()) for part in given))
     silent = heads.spoken_mask(lead.actions, session.actor.net.spec.used) == 0  # (E, H)

@@ -25,12 +25,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.redrawn import redrawn, sites_of
 from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.analysis.rooms import wins_of
 from socialai_dsl.analysis.search import Search, SearchVerdict
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
 
@@ -146,7 +146,7 @@ class _Twins:
         self._drawn, looks = [], None
         for number in range(_BLOCKS):
             table = self._table(number)
-            table.reset(self._seed, {"index": np.full(table.rows, room)})
+            begin(table, self._seed, {"index": np.full(table.rows, room)})
             looks_here = self._looks(table)
             looks = looks_here[0] if looks is None else looks
             self._drawn += [
@@ -168,10 +168,10 @@ class _Twins:
             state = self._tables[twin.table].state
             state.registers[twin.row], state.boards[twin.row], state.keys[twin.row] = twin.start
         for number in sorted({twin.table for twin in self._drawn}):
-            batch = self._tables[number].batch
+            table = self._tables[number]
             for action in plan:
-                batch.ports.actions[:] = action
-                batch.step(Task.STEP_ONLY)
+                table.batch.ports.actions[:] = action
+                advance(table)
         ends = np.stack([self._tables[twin.table].state.registers[twin.row] for twin in self._drawn])
         solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
         return solved
@@ -198,7 +198,7 @@ class _Twins:
         relevant = Relevance.of(self._program).registers
         shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
         for room in range(_ROOMS_PER_SITE):
-            table.reset(self._seed, {"index": np.full(len(copies), room)})
+            begin(table, self._seed, {"index": np.full(len(copies), room)})
             looks, registers = self._looks(table), table.state.registers[:, relevant]
             seen = (looks[1:] != looks[0]).any(axis=1)
             shows |= seen

@@ -1,18 +1,21 @@
 """Tries what a scenario claims, whether it can be known, and whether everything in it can happen."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.analysis.coverage import coverage
 from socialai_dsl.analysis.depth import depth
-from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.effort import Effort, OutOfTimeError
 from socialai_dsl.analysis.properties import Trial, by_default
+from socialai_dsl.analysis.reports import Evidence, Report
 from socialai_dsl.analysis.scenario_report import ScenarioReport
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import load
+from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.source import Source
 
 Say = Callable[[str], None]
@@ -61,13 +64,14 @@ def check_scenario(
         trial = Trial(loaded, effort, scripted)
         plans = by_default(loaded, place)
         for number, plan in enumerate(plans):
-            found = trial.check(plan, part(len(plans) - number + 1 + 2 * deep))
+            found = _tried(trial, plan, part(len(plans) - number + 1 + 2 * deep))
             report.tried += ((plan, found),)
             tell()
             if effort.clock.interrupted:
                 break
         if not effort.clock.interrupted:
-            report.coverage = coverage(loaded, part(1 + 2 * deep), scripted)
+            with suppress(OutOfTimeError):
+                report.coverage = coverage(loaded, part(1 + 2 * deep), scripted)
             tell()
         if deep and not effort.clock.interrupted:
             report.depth = depth(trial, part(1))
@@ -78,6 +82,15 @@ def check_scenario(
     report.complete = True
     tell()
     return report
+
+
+def _tried(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    """What is found of a claim; nothing where there is no time for a first room."""
+    try:
+        with effort.clock.limiting():
+            return trial.check(plan, effort)
+    except OutOfTimeError:
+        return Evidence().report("", None)
 
 
 def scenarios_of(name: str, texts: Texts = None) -> list[tuple[LoadedScenario, str]]:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.advance import advance, begin, compiled
+from socialai_dsl.analysis.effort import Effort, OutOfTimeError, keep_time
 from socialai_dsl.analysis.search import Search, SearchVerdict
 from socialai_dsl.analysis.twins import random_actions
 from socialai_dsl.checking.loaded import LoadedScenario
-from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
@@ -82,14 +83,23 @@ def coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | 
         loaded: the scenario.
         effort: how much to try.
         scripted: the same scenario with a frame for the agent, if there is one.
+
+    Raises:
+        OutOfTimeError: there was no time to play, so that nothing is known.
     """
-    program = compile_loaded(loaded)
+    with effort.clock.limiting():
+        return _coverage(loaded, effort, scripted)
+
+
+def _coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None) -> Coverage:
+    program = compiled(loaded)
     parts, seen = list(_parts(loaded.checked)), _Seen(program)
     _play_at_random(program, seen, effort)
     if scripted is not None:
-        _play_script(compile_loaded(scripted), seen, effort)
-    missing = _missing(parts, seen)
-    proven = bool(missing) and _search(program, parts, seen, effort)
+        _play_script(compiled(scripted), seen, effort)
+    proven = False
+    with suppress(OutOfTimeError):
+        proven = bool(_missing(parts, seen)) and _search(program, parts, seen, effort)
     missing = _missing(parts, seen)
     return Coverage(len({part.span for _, part in parts}), tuple(missing), proven)
 
@@ -132,10 +142,11 @@ def _has_happened(key: _Key, part: CoverageItem, seen: _Seen) -> bool:
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
     table = Table([program], effort.rooms)
-    table.reset(effort.seed, None)
+    begin(table, effort.seed, None)
     seen.watch(table.state.registers)
     choose = random_actions(program, effort.rooms, effort.seed)
     for step in range(_STEPS):
+        keep_time()
         table.batch.ports.actions[:] = choose(step)
         table.batch.step(Task.STEP_NEXT)
         seen.watch(table.state.registers)
@@ -145,10 +156,10 @@ def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
 def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
     """Members and their states have the same names and numbers with a frame for the agent."""
     table, watching = Table([program], effort.rooms), _Seen(program, seen.names, seen.states)
-    table.reset(effort.seed, None)
+    begin(table, effort.seed, None)
     while not table.state.registers[:, Register.ENDED].all():
         table.batch.ports.actions[:] = table.scripted_actions()
-        table.batch.step(Task.STEP_ONLY)
+        advance(table)
         watching.watch(table.state.registers)
     watching.count(table.counters())
 
@@ -156,7 +167,7 @@ def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
 def _search(program: Program, parts: list[tuple[_Key, CoverageItem]], seen: _Seen, effort: Effort) -> bool:
     """Go through all that can be done in room after room; whether nothing was left out."""
     table = Table([program], effort.rooms)
-    table.reset(effort.seed, None)
+    begin(table, effort.seed, None)
     search = Search(program, (), seen.watch)
 
     def find(row: int) -> bool:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from socialai_dsl.analysis.advance import compiled
 from socialai_dsl.analysis.alone import Alone, success_alone
-from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.effort import Effort, OutOfTimeError
 from socialai_dsl.analysis.properties import Trial
 from socialai_dsl.analysis.search import Finding, SearchVerdict
 from socialai_dsl.checking.loaded import LoadedScenario
-from socialai_dsl.compilation import compile_loaded
 
 
 @dataclass(frozen=True)
@@ -36,17 +37,20 @@ class Depth:
 def depth(trial: Trial, effort: Effort) -> Depth:
     """Search rooms, let the script play them, and try what a policy gets that knows of no NPC."""
     searching = replace(effort, clock=effort.clock.part(2))
-    findings = list(trial.successes(searching, "shortest successes"))
-    unsolved = None
-    if trial.scripted is not None:
-        unsolved = tuple((~trial.solved).nonzero()[0].tolist())
+    findings: list[Finding] = []
+    unsolved = alone = None
+    with suppress(OutOfTimeError), effort.clock.limiting():
+        findings = list(trial.successes(searching, "shortest successes"))
+        if trial.scripted is not None:
+            unsolved = tuple((~trial.solved).nonzero()[0].tolist())
+        alone = without_npcs(trial.loaded, effort)
     return Depth(
         len(findings),
         tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
         _rooms(findings, SearchVerdict.UNSOLVABLE),
         _rooms(findings, SearchVerdict.UNDECIDED),
         unsolved,
-        without_npcs(trial.loaded, effort),
+        alone,
     )
 
 
@@ -55,7 +59,7 @@ def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
     if all(entity.role != "npc" for entity in loaded.checked.entities):
         return None
     hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
-    return success_alone(compile_loaded(hidden), effort)
+    return success_alone(compiled(hidden), effort)
 
 
 def _rooms(findings: Sequence[Finding], verdict: SearchVerdict) -> tuple[int, ...]:

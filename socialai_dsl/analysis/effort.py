@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -15,6 +16,10 @@ _QUIET: Final = 1.0
 """Seconds after which progress is told, and between two such lines."""
 
 T = TypeVar("T")
+
+
+class OutOfTimeError(Exception):
+    """The time of a task is spent, or an interruption was requested, before anything was found out."""
 
 
 class Clock:
@@ -52,6 +57,15 @@ class Clock:
         own._whole = self._whole
         return own
 
+    @contextmanager
+    def limiting(self) -> Iterator[None]:
+        """Within the block `keep_time` looks at this clock."""
+        token = _limit.set(self)
+        try:
+            yield
+        finally:
+            _limit.reset(token)
+
     def interrupt(self) -> None:
         """Stop as soon as possible, and tell what is known."""
         self._whole._interrupted = True
@@ -70,6 +84,20 @@ class Clock:
         if self._tell is not None and now - self._whole._last >= _QUIET:
             self._whole._last = now
             self._tell(what)
+
+
+_limit: ContextVar[Clock | None] = ContextVar("limit", default=None)
+
+
+def keep_time() -> None:
+    """Give up what is being done once the clock that limits it is over.
+
+    Raises:
+        OutOfTimeError: it is.
+    """
+    clock = _limit.get()
+    if clock is not None and clock.is_over:
+        raise OutOfTimeError
 
 
 @dataclass(frozen=True)
@@ -95,7 +123,10 @@ class Effort:
                 return
             self.clock.progress(f"{what}: room {room} of {self.rooms}")
             try:
-                found = find(room)
+                with self.clock.limiting():
+                    found = find(room)
+            except OutOfTimeError:
+                return
             except KeyboardInterrupt:
                 self.clock.interrupt()
                 return

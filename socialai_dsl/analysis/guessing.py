@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.analysis.rooms import wins_of
@@ -27,7 +28,6 @@ from socialai_dsl.analysis.search import (
     multipliers,
     useful_actions,
 )
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Header, Program, Register
@@ -115,7 +115,7 @@ class Guessing:
         rooms = len(weights)
         self._at_once = max(1, _ROWS // (len(self._actions) * rooms))
         self._table = Table([program], self._at_once * len(self._actions) * rooms)
-        self._table.reset(0, None)
+        begin(self._table, 0, None)
         self._alone = Search(program)
         self._solvable: dict[tuple[int, bytes], SearchVerdict] = {}
         self._wins = wins_of(program)
@@ -325,7 +325,7 @@ class Guessing:
         changed = np.repeat(chance, rooms)
         state.keys[:used, Key.KEY] ^= changed
         ports.actions[:used] = np.repeat(actions, rooms, axis=0)
-        self._table.batch.step(Task.STEP_ONLY)
+        advance(self._table)
         state.keys[:used, Key.KEY] ^= changed
 
         registers = state.registers[:used]

@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
@@ -26,7 +27,6 @@ from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.analysis.rooms import Rooms, wins_of
 from socialai_dsl.analysis.search import Search, SearchVerdict, marks
 from socialai_dsl.analysis.twins import like_first
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import Program, Register
@@ -95,7 +95,7 @@ class Knowing:
         sites = [site for site, _ in named]
         self._script = None if scripted is None else _Script(scripted, sites, self._chances, effort)
         self._playing = Table([program], max(1, len(copies) + len(self._chances)))
-        self._playing.reset(0, None)
+        begin(self._playing, 0, None)
         self._search = Search(program)
         self._pair = Guessing(program, np.ones(2, np.int64))
         self._wins = wins_of(program)
@@ -143,7 +143,7 @@ class Knowing:
 
     def _others(self, room: int) -> list[_Other]:
         """The alternatives of a room that begin otherwise and look the same."""
-        self._table.reset(self._effort.seed, {"index": np.full(self._table.rows, room)})
+        begin(self._table, self._effort.seed, {"index": np.full(self._table.rows, room)})
         state = self._table.state
         relevant = self._relevance.of_rows(state.registers[:, : self._rooms.start(room)[0].shape[0]])
         different = (relevant != relevant[0]).any(axis=1)
@@ -160,7 +160,7 @@ class Knowing:
 
     def _solved(self, others: Sequence[_Other], plan: Plan) -> NDArray[np.bool_]:
         """In which alternatives a plan succeeds as well."""
-        state, batch, count = self._playing.state, self._playing.batch, len(others)
+        state, count = self._playing.state, len(others)
         state.registers[:, Register.ENDED] = 1
         for row, other in enumerate(others):
             registers, board, key = other.start
@@ -168,8 +168,8 @@ class Knowing:
             state.boards[row] = board[: state.boards.shape[1]]
             state.keys[row] = self._playing.own_keys(key)
         for action in plan:
-            batch.ports.actions[:] = action
-            batch.step(Task.STEP_ONLY)
+            self._playing.batch.ports.actions[:] = action
+            advance(self._playing)
         ends = state.registers[:count]
         solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
         return solved
@@ -215,7 +215,7 @@ def followed(table: Table, program: Program) -> ScriptRun:
         if not state.registers[0, Register.ENDED]:
             plan.append(actions[0].copy())
         table.batch.ports.actions[:] = actions
-        table.batch.step(Task.STEP_ONLY)
+        advance(table)
         step += 1
     solved = wins_of(program)[state.registers[:, Register.OUTCOME]]
     if not solved[0]:
@@ -243,7 +243,7 @@ class _Script:
 
     def play(self, room: int) -> ScriptRun:
         """Play the room and all alternatives to the end."""
-        self._table.reset(self._seed, {"index": np.full(self._table.rows, room)})
+        begin(self._table, self._seed, {"index": np.full(self._table.rows, room)})
         self._table.state.keys[self._first_chance :, Key.KEY] ^= self._chances
         return followed(self._table, self._program)
 

@@ -10,10 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin, compiled
 from socialai_dsl.analysis.twins import pairs_alike
 from socialai_dsl.checking.loaded import LoadedScenario
-from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
 from socialai_dsl.semantics.plans import CheckedScenario, Placing
@@ -84,14 +83,14 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
         rooms: how many rooms.
         seed: of the rooms.
     """
-    program = compile_loaded(scripted)
+    program = compiled(scripted)
     pairs = list(_pairs(program, scripted.checked, rooms, seed))
     if not pairs:
         return PerceptionResult(0, ())
     table = Table([program], 2 * len(pairs))
     index = [number for pair in pairs for number in (pair.index, pair.twin_index)]
     given = [layout for pair in pairs for layout in (pair.layout, pair.twin)]
-    table.reset(seed, {"index": np.array(index), "layout": given})
+    begin(table, seed, {"index": np.array(index), "layout": given})
     running = pairs_alike(table)
     alike, peeks, step = int(running.sum()), [], 0
     while running.any():
@@ -103,7 +102,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
         running &= ~otherwise
         actions[1::2] = actions[0::2]
         table.batch.ports.actions[:] = actions
-        table.batch.step(Task.STEP_ONLY)
+        advance(table)
         running &= (table.state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
         running &= pairs_alike(table)
     return PerceptionResult(alike, tuple(sorted(peeks, key=lambda peek: (peek.index, peek.step))))
@@ -259,7 +258,7 @@ def _other(
 def _redrawn(table: Table, seed: int, index: int, layout: Mapping[str, Any]) -> dict[str, Any] | None:
     """A room of this number, drawn around a layout; None if nothing can be drawn around it."""
     try:
-        table.reset(seed, {"index": index, "layout": layout})
+        begin(table, seed, {"index": index, "layout": layout})
     except (ValueError, RuntimeError):
         return None
     return _kept(table.describe(0))

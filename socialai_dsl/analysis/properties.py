@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin, compiled
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.knowable import Knowability, Knowing, RoomKnown, followed
@@ -42,7 +43,6 @@ from socialai_dsl.analysis.twins import (
 )
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
@@ -80,7 +80,9 @@ class Trial:
 
     @cached_property
     def solved(self) -> NDArray[np.bool_]:
-        """In which rooms the script succeeds, (rooms,); in none if there is no script."""
+        """In which rooms the script succeeds, (rooms,); in none if there is no script. Keeps to the time that limits
+        it (`Clock.limiting`).
+        """
         if self.scripted is None:
             return np.zeros(self.effort.rooms, np.bool_)
         return solved_by_script(self.scripted, self.effort)
@@ -197,7 +199,7 @@ def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
     goal = OutcomePlan(_HOLDS, False, 0, plan.condition)
     remembered = tuple({drawn.path: drawn for drawn in (*checked.remembered, *plan.remembered)}.values())
     copy = replace(checked, outcomes=(goal, *checked.outcomes), remembered=remembered)
-    return compile_loaded(replace(loaded, checked=copy))
+    return compiled(replace(loaded, checked=copy))
 
 
 def search_rooms_of(
@@ -205,7 +207,7 @@ def search_rooms_of(
 ) -> Iterator[Finding]:
     """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
     table = Table([program], effort.rooms)
-    table.reset(effort.seed, None)
+    begin(table, effort.seed, None)
     search = Search(program, goals)
 
     def find(row: int) -> Finding:
@@ -266,11 +268,11 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
     """In which rooms of the effort the agent's own frame succeeds, (rooms,)."""
     table = Table([program], effort.rooms)
-    table.reset(effort.seed, None)
+    begin(table, effort.seed, None)
     registers = table.state.registers
     while not registers[:, Register.ENDED].all():
         table.batch.ports.actions[:] = table.scripted_actions()
-        table.batch.step(Task.STEP_ONLY)
+        advance(table)
     return wins_of(program)[registers[:, Register.OUTCOME]]
 
 
@@ -387,10 +389,10 @@ class _Needing:
 
     def __init__(self, trial: Trial, plan: PropertyPlan, effort: Effort) -> None:
         self._trial, self._plan, self._effort = trial, plan, effort
-        silent = compile_loaded(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
+        silent = compiled(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
         self._search = Search(silent)
         self._alone = Table([silent], effort.rooms)
-        self._alone.reset(effort.seed, None)
+        begin(self._alone, effort.seed, None)
         self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
         self._with: dict[int, _Draw] = {}
         self._scripted: dict[int, _Draw | None] = {}
@@ -490,7 +492,7 @@ class _Draw:
         for first in range(min(len(self._layouts), _TURNS)):
             layouts = [*self._layouts[first:], *self._layouts[:first]]
             weights = [*self._weights[first:], *self._weights[:first]]
-            self._table.reset(effort.seed, {"index": room, "layout": layouts})
+            begin(self._table, effort.seed, {"index": room, "layout": layouts})
             known = followed(self._table, self._program).known
             if any(weights[0] + weights[row] > max(weights) for row in known):
                 return True
@@ -498,7 +500,7 @@ class _Draw:
 
     def guess(self, room: int, effort: Effort) -> Guess:
         """How well a room can be solved, whatever its draw."""
-        self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
+        begin(self._table, effort.seed, {"index": room, "layout": self._layouts})
         state = self._table.state
         if not like_first(self._table).all():
             return Guess(GuessingVerdict.TELLS_APART, 0, True)
@@ -506,8 +508,8 @@ class _Draw:
 
     def told(self, room: int, effort: Effort, tellers: Tellers) -> str | None:
         """The first difference between the rooms of this draw, in words; None if none is found."""
-        self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
-        state, batch = self._table.state, self._table.batch
+        begin(self._table, effort.seed, {"index": room, "layout": self._layouts})
+        state = self._table.state
         plan: Plan | None = ()
         if like_first(self._table).all():
             few = replace(effort, states=_SEARCHED_STATES)
@@ -517,8 +519,8 @@ class _Draw:
         before = state.registers.copy()
         for action in plan:
             before = state.registers.copy()
-            batch.ports.actions[:] = action
-            batch.step(Task.STEP_ONLY)
+            self._table.batch.ports.actions[:] = action
+            advance(self._table)
         same = like_first(self._table)
         if same.all():
             return None

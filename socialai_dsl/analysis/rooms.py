@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
 from socialai_dsl.semantics.free_cells import asks_about_cells
@@ -29,7 +29,7 @@ class Rooms:
         self.checked, self.program = checked, program
         self._effort = effort
         self._table = Table([program], effort.rooms)
-        self._table.reset(effort.seed, None)
+        begin(self._table, effort.seed, None)
         state = self._table.state
         self._registers, self._boards = state.registers.copy(), state.boards.copy()
         self._keys = state.keys.copy()
@@ -73,7 +73,7 @@ class Rooms:
         registers = self._table.state.registers
         while not registers[:, Register.ENDED].all():
             self._table.batch.ports.actions[:] = idle(self.program)
-            self._table.batch.step(Task.STEP_ONLY)
+            advance(self._table)
         return wins_of(self.program)[registers[:, Register.OUTCOME]]
 
 

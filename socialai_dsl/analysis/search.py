@@ -8,6 +8,7 @@ first to be found is the earlier one, and with more time left nothing is lost.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -17,11 +18,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.effort import Clock
+from socialai_dsl.analysis.advance import advance, begin
+from socialai_dsl.analysis.effort import Clock, OutOfTimeError
 from socialai_dsl.analysis.redrawn import sites_of
 from socialai_dsl.analysis.relevance import Relevance
 from socialai_dsl.draws import GOLDEN, MASK, below, draw, mix
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
@@ -123,7 +124,7 @@ class Search:
         self._actions = np.repeat(actions, self._chances.count, axis=0)
         self._at_once = max(1, _ROWS // len(self._actions))
         self._table = Table([program], self._at_once * len(self._actions))
-        self._table.reset(0, None)
+        begin(self._table, 0, None)
         wanted = [o.success if goals is None else o.name in goals for o in program.outcome_table]
         self._wins = np.array([*wanted, False])
 
@@ -143,6 +144,17 @@ class Search:
 
         It is undecided as soon as the clock is over.
         """
+        try:
+            with nullcontext() if clock is None else clock.limiting():
+                return self._solved(registers, board, key, states)
+        except OutOfTimeError:
+            if clock is None or not clock.is_over:
+                raise  # of a clock around this one
+            return Finding(SearchVerdict.UNDECIDED, len(self._parents), None, False)
+
+    def _solved(
+        self, registers: NDArray[np.int16], board: NDArray[np.uint32], key: NDArray[np.uint64], states: int
+    ) -> Finding:
         state = self._table.state
         layer = _Layer(
             registers[None, : state.registers.shape[1]].copy(),
@@ -162,7 +174,7 @@ class Search:
                     return Finding(
                         SearchVerdict.SOLVABLE, len(self._parents), self._plan(chosen), True, len(chosen)
                     )
-                if len(self._parents) > states or (clock is not None and clock.is_over):
+                if len(self._parents) > states:
                     return Finding(SearchVerdict.UNDECIDED, len(self._parents), None, False)
             layer = _joined(following, layer)
         return Finding(SearchVerdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
@@ -171,7 +183,7 @@ class Search:
         self, registers: NDArray[np.int16], board: NDArray[np.uint32], key: NDArray[np.uint64]
     ) -> bool:
         """Whether a success is found by acting at random from one state, as for `solve`, without other draws."""
-        state, batch = self._table.state, self._table.batch
+        state, ports = self._table.state, self._table.batch.ports
         walks = min(_WALKS, self._table.rows)
         acting = RandomActions(self._actions[:: self._chances.count], walks)
         state.registers[walks:, Register.ENDED] = 1
@@ -180,8 +192,8 @@ class Search:
         state.keys[:walks] = self._table.own_keys(key)
         ended = state.registers[:walks, Register.ENDED]
         while not ended.all():
-            batch.ports.actions[:walks] = acting.next()
-            batch.step(Task.STEP_ONLY)
+            ports.actions[:walks] = acting.next()
+            advance(self._table)
             if self._wins[state.registers[:walks, Register.OUTCOME][ended != 0]].any():
                 return True
         return False
@@ -200,7 +212,7 @@ class Search:
         keys[:, Key.KEY] ^= np.tile(marks, used // self._chances.count)
         state.keys[:used] = keys
         ports.actions[:used] = np.tile(self._actions, (len(nodes), 1))
-        self._table.batch.step(Task.STEP_ONLY)
+        advance(self._table)
 
         reached = state.registers[:used]
         if self._witness is not None:

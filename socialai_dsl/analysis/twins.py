@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.rooms import name_of
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Start, Table, joined
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
@@ -154,7 +154,7 @@ class Twins:
         self._table = Table([program], 2 * len(values))
         given = [layout for pair in values.tolist() for layout in layouts(program, path, pair)]
         index = np.repeat(np.arange(len(values)), 2)
-        self._table.reset(seed, {"index": index, "layout": given})
+        begin(self._table, seed, {"index": index, "layout": given})
 
     def start(self, room: int) -> Start:
         """How the two of a room begin: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
@@ -173,7 +173,7 @@ class Twins:
         while running.any():
             before = state.registers.copy()
             ports.actions[:] = np.repeat(actions(step), 2, axis=0)
-            self._table.batch.step(Task.STEP_ONLY)
+            advance(self._table)
             step += 1
             running &= (state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
             for k in np.flatnonzero(running & ~pairs_alike(self._table)).tolist():
@@ -211,13 +211,13 @@ class Script:
     def __init__(self, program: Program, path: str, values: Sequence[int], seed: int) -> None:
         self._table = Table([program], len(values))
         given = layouts(program, path, values)
-        self._table.reset(seed, {"index": np.arange(len(values)), "layout": given})
+        begin(self._table, seed, {"index": np.arange(len(values)), "layout": given})
 
     def __call__(self, step: int) -> NDArray[np.int64]:
         """Its actions, which are also done in its own rooms."""
         actions = self._table.scripted_actions()
         self._table.batch.ports.actions[:] = actions
-        self._table.batch.step(Task.STEP_ONLY)
+        advance(self._table)
         return actions
 
 

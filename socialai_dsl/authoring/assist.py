@@ -14,7 +14,7 @@ from socialai_dsl.authoring.language_schema import FILES
 from socialai_dsl.authoring.names import Name, frame_of, last_key, meant, part_at, visible
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
-from socialai_dsl.schema.annotations import annotation_at, literals, model_at
+from socialai_dsl.schema.annotations import annotation_at, holds_expressions, literals, model_at
 from socialai_dsl.schema.files import ScenarioFile
 from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.signatures import (
@@ -32,10 +32,6 @@ _TEXTS: Final = ("say", "ask", "answers")
 """Keys whose values are texts with values in them."""
 
 _NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
-_EXPRESSIONS: Final = frozenset(
-    "when until after for while success failure reward set let define state start range of with earshot locked tagged "
-    "pressed opened color facing at require reachable never width height size count tables name answer".split()
-)
 _WORDS: Final = {
     "agent": "the agent, whom a policy plays",
     "self": "the NPC that follows the frame",
@@ -192,9 +188,9 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
         yield from _keys(cursor, cursor.path[:-1], data)
         return
     key = last_key(cursor.path)
+    root = _root(cursor.data)
     if not cursor.before.strip():
         yield from _keys(cursor, cursor.path, data)
-        root = _root(cursor.data)
         words = literals(annotation_at(root, cursor.path)) if root is not None else []
         yield from (Offer(str(word), "word", "") for word in words)
     if key in _NAMING_FILES and folder is not None and len(cursor.path) <= 4:
@@ -211,7 +207,7 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
     elif key in (*_TEXTS, "about", "notes", "skills") and cursor.before.rpartition("<")[2].count(">") != 0:
         return
     elif key not in ("about", "notes", "skills") and (key not in _TEXTS or "<" in cursor.before):
-        yield from _in_expression(cursor, data, key)
+        yield from _in_expression(cursor, data, key, root)
 
 
 def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
@@ -228,19 +224,25 @@ def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
             yield Offer(key, "key", field.description or "")
 
 
-def _in_expression(cursor: Cursor, data: Data, key: str) -> Iterator[Offer]:
+def _in_expression(cursor: Cursor, data: Data, key: str, root: type[BaseModel] | None) -> Iterator[Offer]:
     if cursor.before.endswith("."):
         table = EFFECTS if key == "cause" else VALUES
         subject = cursor.before.removesuffix(".").split(" ")[-1].lstrip("(!<")
         yield from _verbs(table.values(), _kinds_of(subject, data))
         return
+    annotation = annotation_at(root, cursor.path) if root is not None else None
+    if holds_expressions(annotation) and literals(annotation):
+        return  # its own words, and numbers
     yield from (Offer(n.word, "name", n.kind) for n in meant(data, cursor.path, False, cursor.before))
-    if key in ("goto", "goto_now", "start", "frame", "role", "order", "id") or cursor.before.endswith("is("):
+    takes_values = holds_expressions(annotation) and key not in ("cause", "place")
+    if not takes_values and key in ("goto", "goto_now", "start", "frame", "role", "order", "id"):
+        return
+    if cursor.before.endswith("is("):
         return
     tables: list[dict[str, Signature]] = []
     tables += [ACTIVITIES] if key == "do" and "(" not in cursor.before else []
     tables += [PLACES] if key in ("place", "build") else []
-    tables += [VALUES] if key in _EXPRESSIONS or "(" in cursor.before or "<" in cursor.before else []
+    tables += [VALUES] if takes_values or "(" in cursor.before or "<" in cursor.before else []
     for table in tables:
         yield from _verbs(table.values(), {"none"} if table is not VALUES else {"none", "own"})
     if VALUES in tables or key in ("cause", "place"):

@@ -110,7 +110,7 @@ def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
             frame = frame_of(data, str(path[1]))
             return declared(data, ("frames", frame, "slots"), f"a slot of `{frame}`") if frame else []
         return []
-    if key in ("goto", "goto_now", "start") and path[:1] == ("frames",):
+    if path[:1] == ("frames",) and (key in ("goto", "goto_now") or path[2:] == ("start",)):
         return states(data, str(path[1]))
     if key == "frame":
         return declared(data, ("frames",), "a frame")

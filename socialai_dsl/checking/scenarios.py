@@ -18,7 +18,7 @@ from socialai_dsl.diagnostics import (
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
-from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
+from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -160,7 +160,7 @@ def _alike(value: Data, default: Data) -> bool:
 MOST_MEMBERS: Final = 16
 _AGENT: Final = "agent"
 _KEYS: Final = frozenset(field.alias or name for name, field in CastMember.model_fields.items())
-_ONE_EACH: Final = ("name", "color", "place", "facing", "at")
+_ONE_EACH: Final = tuple(key for key in CastGroup.__annotations__ if key != "count")
 """Keys of a group whose lists give one value each."""
 
 

@@ -223,12 +223,16 @@ class Table(Copied):
             )
         ended = self.play(task, given)
         if ended == BAD_ACTION:
-            space = self.merged.action_space()
-            row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
-            raise ValueError(
-                f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}"
-            )
+            raise self.refusal(given)
         return ended
+
+    def refusal(self, actions: NDArray[np.integer[Any]]) -> ValueError:
+        """Why a step did nothing: one of the actions is outside of the space."""
+        space = self.merged.action_space()
+        row = next(i for i, action in enumerate(actions) if not space.contains(action.astype(space.dtype)))
+        return ValueError(
+            f"step: got the action {actions[row].tolist()} in row {row}; expected one of {space}"
+        )
 
     def stepper(self, task: Task) -> Callable[[], int]:
         """A call that steps all rows with the actions in the ports: see `Batch.stepper`."""
@@ -345,7 +349,15 @@ class Table(Copied):
             )
         self.look("the script")
         self.batch.script()
-        return self.batch.ports.actions.copy()
+        actions = self.batch.ports.actions.copy()
+        lacking = np.flatnonzero(actions[:, 0] < 0)
+        if len(lacking):
+            program = self.programs[self.number(int(lacking[0]))]
+            raise ValueError(
+                f"the script of {program.name} does what its agent cannot do; expected one of its actions, "
+                f"{', '.join(program.actions)}"
+            )
+        return actions
 
     # --- looking ---
 

@@ -8,6 +8,10 @@ from typing import Final, Literal
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader.reader import MAX_PATCH_PATH
+from socialai_dsl.schema.annotations import sections_of
+from socialai_dsl.schema.files import VariantFile
+from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.schema.suite import Suite
 from socialai_dsl.source import Node, Span
 
 _INDEX: Final = re.compile(r"\[([^\[\]]*)\]")
@@ -126,17 +130,21 @@ def _shown(path: str, end: int) -> str:
 # -- patches -------------------------------------------------------------------------------------------------
 
 
-VARIANT_KEYS: Final = ("variant", "of", "about", "notes", "skills", "remove", "set", "add")
+VARIANT_KEYS: Final = tuple(VariantFile.model_fields)
 
 PATCH_VERBS: Final = ("remove", "set", "add")
 
 _DESCRIPTION: Final = ("about", "notes", "skills")
 
-# Sections that every scenario has, if only empty: a patch may put something into them though the file has none.
-_MAPPING_SECTIONS: Final = frozenset(
-    "params grammar room objects let define state tables memory frames roles npc_defaults cast reward observe".split()
-)
-_LIST_SECTIONS: Final = frozenset("rules outcome check require".split())
+_MAPPINGS, _LISTS = map(frozenset, sections_of(Scenario))
+_OF_SUITES = tuple(map(frozenset, sections_of(Suite)))
+
+
+def _sections(root: Node) -> tuple[frozenset[str], frozenset[str]]:
+    """The mappings and the lists that every file of a kind has, if only empty: a patch may put something into them
+    though the file has none.
+    """
+    return (_OF_SUITES[0], _OF_SUITES[1]) if root.entry("suite") is not None else (_MAPPINGS, _LISTS)
 
 
 @dataclass(frozen=True)
@@ -273,7 +281,7 @@ def _place(root: Node, path: str, value: Node, found: DiagnosticBag) -> Place | 
         return None
     place = follow(root, path)
     section = path.split(".", 1)[0]
-    if isinstance(place, Miss) and root.entry(section) is None and section in _MAPPING_SECTIONS:
+    if isinstance(place, Miss) and root.entry(section) is None and section in _sections(root)[0]:
         _empty_section(root, section, value)
         place = follow(root, path)
     if isinstance(place, Miss):
@@ -296,15 +304,16 @@ def _or_section(miss: Miss, root: Node, section: str, path: str) -> Miss:
     """The same miss; if it is about the first key, the sections that may be empty are suggested as well."""
     if miss.suggestion or root.entry(section) is not None:
         return miss
-    named = did_you_mean(section, _MAPPING_SECTIONS | _LIST_SECTIONS)
+    named = did_you_mean(section, frozenset.union(*_sections(root)))
     return Miss(miss.message, named + path[len(section) :] if named else None, None, miss.hint)
 
 
 def _empty_section(root: Node, path: str, value: Node) -> Node | None:
     """A section that the scenario does not have, made empty; None if there is no section of this name."""
-    if not isinstance(root.children, dict) or path not in _MAPPING_SECTIONS | _LIST_SECTIONS:
+    mappings, lists = _sections(root)
+    if not isinstance(root.children, dict) or path not in mappings | lists:
         return None
-    section = Node(value.span, children={} if path in _MAPPING_SECTIONS else [])
+    section = Node(value.span, children={} if path in mappings else [])
     root.children[path] = section
     return section
 

@@ -34,9 +34,13 @@ MAX_PATCH_PATH: Final = 500
 
 FORBIDDEN: Final = re.compile(
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
-    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff"
+    "\u00ad\u034f\u115f\u1160\u17b4\u17b5\u180e\u200b\u2060-\u2065\u206a-\u206f"
+    "\u3164\uffa0\ufff9-\ufffb\U000e0000-\U000e0fff]"
 )
-"""Characters no text may hold: control, line separators, bidirectional, surrogates, byte order marks."""
+"""Characters no text may hold: control, line separators, bidirectional, surrogates, byte order marks, and others that
+cannot be seen. Joiners, which some scripts and emoji need, are text.
+"""
 
 _MOST_REPORTED: Final = 20
 

@@ -25,6 +25,7 @@ from socialai_dsl.schema.scenario import (
     Character,
     FirstRule,
     Frame,
+    Look,
     Memory,
     Npc,
     ObjectGroup,
@@ -67,6 +68,7 @@ CALLED: Final[dict[type, str]] = {
     SungWith: "the utterance of a sequence",
     Memory: "a memory",
     Register: "a register",
+    Look: "a look",
     Belief: "a belief",
     Source: "a source of a belief",
     Reward: "`reward`",
@@ -175,6 +177,30 @@ def branches(annotation: Any) -> Iterator[Any]:
             yield from branches(branch)
     else:
         yield annotation
+
+
+def holds_expressions(annotation: Any) -> bool:
+    """Whether a place takes an expression, or several."""
+    parts = [part for part in branches(annotation) if part is not type(None)]
+    several = [get_args(part)[0] for part in parts if get_origin(part) is tuple]
+    return all(kind in parts for kind in (int, bool, str)) or any(map(holds_expressions, several))
+
+
+def sections_of(model: type[BaseModel]) -> tuple[list[str], list[str]]:
+    """The keys of a file that it may lack and that are mappings, and those that are lists: empty as good as missing."""
+    mappings, lists = list[str](), list[str]()
+    for name, field in model.model_fields.items():
+        parts = list(branches(field.annotation))
+        if any(
+            get_origin(part) is dict or (isinstance(part, type) and issubclass(part, BaseModel))
+            for part in parts
+        ):
+            mappings.append(field.alias or name)
+        elif any(get_origin(part) in (tuple, list) for part in parts) and (
+            field.is_required() or not field.default
+        ):
+            lists.append(field.alias or name)
+    return mappings, lists
 
 
 def literals(annotation: Any) -> list[object]:

@@ -103,6 +103,10 @@ class Model(BaseModel):
     )
 
 
+Earshot = Literal["next_to", "room"] | Expression
+"""The reach of a voice: a word, or a number of cells."""
+
+
 # -- who acts and how ----------------------------------------------------------------------------------------
 
 
@@ -323,7 +327,7 @@ class Character(Model):
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
-    earshot: Expression | None = Field(None, description="the reach of its voice")
+    earshot: Earshot | None = Field(None, description="the reach of its voice")
     frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
     with_: dict[Word, ExpressionOrText] = Field(
         default_factory=dict, alias="with", description="fills the slots"
@@ -662,7 +666,7 @@ class Scenario(Model):
         None, ge=1, description="how long the recipe guided trains an agent for"
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
-    earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
+    earshot: Earshot = Field("next_to", description="next_to, room, or a Manhattan distance")
     overheard: bool = Field(True, description="whether others within earshot hear what is said to one")
     actions: ListOf[Primitive] = Field(
         PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"

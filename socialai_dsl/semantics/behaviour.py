@@ -9,7 +9,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import addressing, groups, hands, object_facts, rows, texts, those
+from socialai_dsl.semantics import abilities, addressing, groups, hands, object_facts, rows, texts, those
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.nesting import NestedPlanner
@@ -91,6 +91,17 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     _check_mover(resolver, name, node, scope)
+    found = _activity(resolver, path, node, name, args, scope)
+    if scope.member == AGENT and not (scope.frame is not None and scope.frame.looked_at):
+        abilities.check_actions(resolver, found, signature, node, scope)
+    return found
+
+
+def _activity(
+    resolver: Resolver, path: DataPath, node: ast.Expr, name: str, args: tuple[ast.Expr, ...], scope: Scope
+) -> Activity:
+    """The activity of a signature, with its arguments."""
+    span, site, signature = resolver.findings.at(path), scope.draws.site, ACTIVITIES[name]
     if name == "wander":
         actions = tuple(Const(ACTION, ACTION.words.index(word)) for word in _WANDERING)
         return Activity("choose", actions, site, span, (1, 1, 1), scope.draws.number())

@@ -44,6 +44,7 @@ from socialai_dsl.semantics.resolver import (
     Resolver,
     number_of_texts,
     texts_of,
+    words_of_values,
 )
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -61,11 +62,12 @@ from socialai_dsl.semantics.terms import (
     Line,
     Quantification,
     SitedTerm,
+    Term,
     Type,
 )
 from socialai_dsl.semantics.texts import words_in_order
-from socialai_dsl.source import DataPath, Node
-from socialai_dsl.vocabulary import PRIMITIVES
+from socialai_dsl.source import DataPath, Node, Span
+from socialai_dsl.vocabulary import PRIMITIVES, composed, words
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
@@ -297,6 +299,83 @@ def _excess(type_: Type, range_: Type | None) -> int:
     return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
 
 
+# -- what is heard reads as what it is, to all who hear it ----------------------------------------------------
+
+
+Spoken = Mapping[str, Mapping[DataPath, Line]]
+"""Member of the cast -> what it says, by place."""
+
+
+def _check_heard(resolver: Resolver, spoken: Spoken) -> None:
+    """Report names and lines that would be heard as if somebody else had spoken, or in another tone (S405)."""
+    findings, symbols = resolver.findings, resolver.symbols
+    divides = re.compile(":| to " if resolver.addresses else ":")
+    for member in symbols.cast:
+        path = symbols.member_path(member, "name")
+        with surviving():
+            for name in words_of_values(resolver.registers.read(f"{member}.name").type):
+                mark = divides.search(composed(name))
+                if findings.must_be_one_line(path, name) and mark is not None:
+                    what = "a colon" if mark.group() == ":" else "` to `"
+                    message = (
+                        f"the name `{name}` has {what} in it, so its lines read as those of somebody else"
+                    )
+                    hint = "what is heard reads `Ann: text`, or `Ann to Bob: text`; leave it out of names"
+                    findings.error("S405", message, findings.at(path), hint=hint)
+    tone = symbols.scenario.observe.tone
+    look = symbols.scenario.looks.get(tone) if tone is not None else None
+    for line in _of_npcs(spoken) if look is not None else ():
+        begun = (re.match(r"\(([^()]*)\)", composed(text)) for text in texts_of(line))
+        said = next(
+            (one for one in begun if one is not None and look is not None and one[1] in look.words), None
+        )
+        if said is not None:
+            message = f"`{said[0]}` reads as the tone of what is said, which the look `{tone}` gives"
+            findings.error("S405", message, line.span, hint="leave it out; the tone is heard anyway")
+
+
+def _report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> None:
+    """Warn of what people tell apart and a trained agent does not, which hears words alone (W406)."""
+    findings, symbols = resolver.findings, resolver.symbols
+    called: dict[tuple[str, ...], tuple[str, str]] = {}
+    for member, name in zip(symbols.cast, names, strict=True):
+        for text in words_of_values(name.type):
+            first, known = called.setdefault(tuple(words(text)), (member, _shown(text)))
+            if first != member and known != _shown(text):
+                message = (
+                    f"`{text}` and `{known}`, which `{first}` is called, are one name to a trained agent"
+                )
+                _warn(resolver, message, text, findings.at(symbols.member_path(member, "name")))
+    heard: dict[tuple[str, tuple[str, ...]], tuple[str, Span]] = {}
+    told: set[Span] = set()
+    for member, lines in spoken.items():
+        who = member if symbols.scenario.observe.names == "shown" else ""
+        for line in _of_npcs({member: lines}):
+            for text in texts_of(line):
+                known, span = heard.setdefault((who, tuple(words(text))), (_shown(text), line.span))
+                if known != _shown(text) and line.span not in told:
+                    told.add(line.span)
+                    where = f"line {span.line}" if span.file == line.span.file else str(span)
+                    message = f'"{text}" and "{known}" ({where}) are the same to a trained agent'
+                    _warn(resolver, message, text, line.span)
+
+
+def _warn(resolver: Resolver, message: str, text: str, span: Span) -> None:
+    hears = " ".join(words(text)) or "none"
+    hint = f"it hears words alone, here {hears}; say what matters in words"
+    resolver.findings.warning("W406", message, span, hint=hint)
+
+
+def _shown(text: str) -> str:
+    return " ".join(composed(text).split())
+
+
+def _of_npcs(spoken: Spoken) -> Iterator[Line]:
+    """All lines but the agent's, whose own utterances are actions."""
+    for member, lines in spoken.items():
+        yield from lines.values() if member != "agent" else ()
+
+
 # -- the whole scenario --------------------------------------------------------------------------------------
 
 
@@ -444,6 +523,7 @@ class _Run:
         inhabitants = tuple(entities_of(resolver))
         believed = tuple(object_facts.beliefs(resolver))
         accepting = tuple(object_facts.accepting(resolver))
+        _check_heard(resolver, spoken)
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
@@ -457,6 +537,7 @@ class _Run:
             possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
+        _report_alike(resolver, spoken, names)
         words = words_in_order(
             self._symbols.sentences,
             names,
@@ -544,11 +625,15 @@ class _Run:
                 yield object_facts.watching(member, number, span)
 
     def _look_at_unused(self) -> None:
-        """Frames that no member plays are checked as if one did, so that no mistake waits for its first use."""
+        """Frames that no member plays are checked as if an NPC did, so that no mistake waits for its first use; where a
+        variant leaves no NPC, nobody can tell what they would mean.
+        """
         played = {frame.name for frame in self._played.values()}
         npcs = [name for name in self._symbols.cast if name != AGENT]
+        if not npcs:
+            return
         # `it` means something only to one of a group, so such a member looks at what nobody plays.
-        npc = next((name for name in npcs if self._symbols.group_of(name)), next(iter(npcs), AGENT))
+        npc = next((name for name in npcs if self._symbols.group_of(name)), npcs[0])
         for name in self._scenario.frames:
             if name not in played:
                 path: DataPath = ("frames", name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
 from typing import Final, cast
@@ -612,3 +612,11 @@ def performed(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, .
         hint = "only what `let` draws as {sequence: ..., moves: ...} can be performed"
         raise resolver.fail("S204", message, node, scope, hint=hint)
     return acts.elements()
+
+
+def moves_of(resolver: Resolver, elements: Iterable[Term]) -> list[str]:
+    """The moves that a sequence is drawn from."""
+    lets = resolver.symbols.scenario.let
+    names = {part.path.partition("[")[0].removeprefix("let.") for part in elements if isinstance(part, Read)}
+    drawn = [model for name, model in lets.items() if name in names and isinstance(model, Sequence)]
+    return list(dict.fromkeys(move for model in drawn for move in model.moves))

@@ -475,6 +475,8 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
     for member in map(str, members):
         known = resolver.symbols.cast[member].beliefs
         if node.name not in known:
+            if member == scope.member and scope.frame is not None and scope.frame.looked_at:
+                raise FailedError  # who believes it plays this frame elsewhere
             hint = f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from heapq import merge
 from itertools import product
 from typing import Final
@@ -23,13 +24,17 @@ from socialai_dsl.semantics.terms import (
     SitedTerm,
     Term,
     draws,
+    is_looked_for,
     is_own_noun,
     may_be_nothing,
     may_find_nothing,
     walk,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import Sentences, normal
+from socialai_dsl.vocabulary import Sentences, first_alike, normal
+
+ALIKE: Final = "case, blanks, a final mark and other forms of the same letters do not count"
+"""Why different texts are one."""
 
 _TOLD = 12
 """How many states of a circle are named."""
@@ -72,13 +77,29 @@ def check_grammar(scenario: Scenario, findings: Findings) -> bool:
             suggestion = f"<{near}>" if near else None
             findings.error(GRAMMAR_CODE, message, findings.at(path, offset), suggestion=suggestion)
     for part, words in (("templates", grammar.templates), ("nouns", grammar.nouns)):
-        seen: set[str] = set()
+        check_alike(part, words, findings)
         for i, word in enumerate(words):
-            if str(word) in seen:
-                span = findings.at(("grammar", part, i), 0, len(str(word)))
-                findings.error("S213", f"`{word}` is in the {part} already", span)
-            seen.add(str(word))
+            path = ("grammar", part, i)
+            findings.must_be_one_line(path, str(word))
+            if part == "nouns" and (mark := re.search("[<>]", str(word))):
+                message = "what stands in a slot has no slots itself"
+                findings.error(GRAMMAR_CODE, message, findings.at(path, mark.start()))
     return True
+
+
+def check_alike(part: str, words: Iterable[object], findings: Findings) -> None:
+    """Report templates or nouns that are heard as one."""
+    seen: dict[str, str] = {}
+    for i, word in enumerate(map(str, words)):
+        first = first_alike(word, seen)
+        if first is not None:
+            span = findings.at(("grammar", part, i), 0, len(word))
+            message = f"`{word}` is in the {part} already"
+            hint = None
+            if first != word:
+                message = f"`{word}` is heard as `{first}`, which is in the {part} already"
+                hint = ALIKE
+            findings.error("S213", message, span, hint=hint)
 
 
 def check_slots_of_grammar(sentences: Sentences, findings: Findings) -> bool:
@@ -261,20 +282,49 @@ _FEW = 64
 def check_shadowed(plan: FramePlan, findings: Findings) -> None:
     """Warn of rules that never fire (W311)."""
     for state in plan.states:
-        _check_rules(state.first, findings)
-        _check_rules(state.then, findings)
+        for part, rules in (("first", state.first), ("then", state.then)):
+            path = ("frames", plan.frame, "states", state.name, part)
+            _check_rules(rules, path, plan.entity == 0, findings)
 
 
-def _check_rules(rules: Sequence[RulePlan], findings: Findings) -> None:
-    candidates = _Candidates(rules)
-    for i, rule in enumerate(rules):
-        above = next((rules[k] for k in candidates.above(rule) if _covers(rules[k], rule)), None)
-        candidates.add(i)
+def _check_rules(rules: Sequence[RulePlan], path: DataPath, is_agent: bool, findings: Findings) -> None:
+    plain = [
+        replace(rule, when=None) if _is_always((*path, i, "when"), rule, findings) else rule
+        for i, rule in enumerate(rules)
+    ]
+    candidates = _Candidates(plain)
+    for i, rule in enumerate(plain):
+        above = next((plain[k] for k in candidates.above(rule) if _covers(plain[k], rule)), None)
+        if not _may_fall_through(rule, is_agent):
+            candidates.add(i)
         if above is not None:
             message = f"this rule never fires: line {above.span.line} holds whenever it does"
             findings.warning(
                 "W311", message, rule.span, hint="the first rule that holds is the only one that fires"
             )
+
+
+def _is_always(path: DataPath, rule: RulePlan, findings: Findings) -> bool:
+    """Whether the condition of a rule is true as it is written, and not by a parameter, which may have other values."""
+    written = findings.places.get(path)
+    if written is None or written.substituted or "$" in str(written.value):
+        return False
+    return rule.when is not None and isinstance(rule.when.term, Const) and bool(rule.when.term.value)
+
+
+def _may_fall_through(rule: RulePlan, is_agent: bool) -> bool:
+    """Whether a rule whose conditions hold may not fire, since a value that it needs for `set`, `cause` or `say` finds
+    nothing, or is no utterance of the agent's. An activity that finds nothing becomes `stay`.
+    """
+    if is_agent and rule.say is not None and not all(isinstance(part, str) for part in rule.say.parts):
+        return True
+    only_agent = not any(pattern.said_by_npcs for pattern in rule.hears)
+    # What a rule hears has the noun and the slots that it asks for.
+    return any(
+        is_looked_for(part)
+        and not (rule.hears and (isinstance(part, terms.HeardNoun) or (only_agent and is_own_noun(part))))
+        for part in walk((rule.sets, rule.causes, rule.say))
+    )
 
 
 class _Candidates:

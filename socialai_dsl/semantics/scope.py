@@ -49,6 +49,10 @@ _NO_TEXTS = frozenset({"cause", "do", "place"})
 """Keys whose values have no texts in them."""
 
 
+_BREAK: Final = re.compile(r"[\t\n\r]")
+"""What ends a line, or moves what follows."""
+
+
 class FailedError(Exception):
     """A value that means nothing; the reason has been reported."""
 
@@ -130,12 +134,26 @@ class Findings:
 
     def text(self, path: DataPath, raw: str) -> ast.Text:
         """The tree of the text at `path`, its parameters replaced by their values."""
+        if not self.must_be_one_line(path, raw):
+            raise FailedError
         try:
             filled = self._filled(parse_text(raw), path)
         except ParseProblem as problem:
             raise self._problem(problem, path) from None
         assert isinstance(filled, ast.Text), "internal: a text became something else"
         return filled
+
+    def must_be_one_line(self, path: DataPath, text: str) -> bool:
+        """Whether a text at `path` is one line, else that is reported: what is said is heard line by line."""
+        match = _BREAK.search(text)
+        if match is None:
+            return True
+        what, hint = "line break", "write it on one line, or behind `>-`, which makes one line of several"
+        if match.group() == "\t":
+            what, hint = "tab", "write a blank"
+        message = f"there is a {what} in a text that is said or shown"
+        self.error("S405", message, self.at(path, match.start()), hint=hint)
+        return False
 
     def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
         code = "S212" if problem.code == "S004" else problem.code
@@ -147,6 +165,11 @@ class Findings:
     def _filled(self, node: ast.Expr, path: DataPath) -> ast.Expr:
         if isinstance(node, ast.Parameter):
             return self._parameter(node, path)
+        if isinstance(node, ast.Text) and any(
+            _BREAK.search(part) for part in node.parts if isinstance(part, str)
+        ):
+            message, hint = "there is a line break or a tab in a text", "a text is one line"
+            raise self.fail("S405", message, self.node(path, node), hint=hint)
         replaced: ast.Expr = rebuilt(node, lambda part: self._filled(part, path))
         return replaced
 

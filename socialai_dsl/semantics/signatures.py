@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, FINISHED, SIDES
+from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, FINISHED, PRIMITIVES, SIDES, Primitive
 
 Argument = Literal[
     "entity",
@@ -47,6 +47,7 @@ class Signature:
         optional: how many of the last arguments may be left out.
         moves: of an activity, what becomes of the member that does it.
         endless: an activity that never ends by itself, so that a step of it says how long it lasts.
+        handles: of an activity, the body actions that it takes besides walking and turning.
     """
 
     name: str
@@ -60,6 +61,17 @@ class Signature:
     optional: int = 0
     moves: Literal["walks", "turns", "stays"] = "walks"
     endless: bool = False
+    handles: tuple[Primitive, ...] = ()
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """The body actions that an activity may take, whatever stands in its brackets."""
+        if self.name in PRIMITIVES:
+            return (self.name,)
+        return (*_MOVES[self.moves], *self.handles)
+
+
+_MOVES: Final = {"walks": ("left", "right", "forward"), "turns": ("left", "right"), "stays": ()}
 
 
 def _activity(
@@ -69,8 +81,11 @@ def _activity(
     *,
     moves: Literal["walks", "turns", "stays"] = "walks",
     endless: bool = False,
+    handles: tuple[Primitive, ...] = (),
 ) -> Signature:
-    return Signature(name, "none", takes, "activity", doc, "activity", moves=moves, endless=endless)
+    return Signature(
+        name, "none", takes, "activity", doc, "activity", moves=moves, endless=endless, handles=handles
+    )
 
 
 SIGNATURES: Final[tuple[Signature, ...]] = (
@@ -163,12 +178,13 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _activity("turn", ("turn",), "a quarter turn left or right", moves="turns"),
     _activity("go_to", ("entity",), "walk to the cell of x"),
     _activity("go_next_to", ("entity",), "walk to a cell next to x"),
-    _activity("use", ("entity",), "go next to x, face it, toggle it"),
-    _activity("fetch", ("entity",), "go next to x, face it, pick it up"),
-    _activity("give", ("entity", "entity"), "go next to y and hand over x, if it carries x"),
-    _activity("bring", ("entity", "entity"), "fetch x, then give it to y, or lay it down on the cell of y"),
+    _activity("use", ("entity",), "go next to x, face it, toggle it", handles=("toggle",)),
+    _activity("fetch", ("entity",), "go next to x, face it, pick it up", handles=("pickup",)),
+    _activity("give", ("entity", "entity"), "go next to y and hand over x, if it carries x", handles=("drop",)),
+    _activity("bring", ("entity", "entity"), "fetch x, then give it to y, or lay it down on the cell of y",
+              handles=("pickup", "drop")),
     _activity("search", ("entities",), "look around, then walk about, until it sees x"),
-    _activity("enter", ("entity",), "open x if it is closed, then go in"),
+    _activity("enter", ("entity",), "open x if it is closed, then go in", handles=("toggle",)),
     _activity("push", ("entity", "direction"), "go behind x and push it that way"),
     _activity("point", ("entity",), "point the way x lies", moves="stays"),
     _activity("point_at", ("entity",), "point at the cell of x, in any direction", moves="stays"),

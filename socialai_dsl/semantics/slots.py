@@ -10,7 +10,7 @@ from socialai_dsl.schema.scenario import CastMember
 from socialai_dsl.semantics.scope import FilledSlot, Findings, Symbols, beside_word, surviving
 from socialai_dsl.semantics.terms import COLOR, Const, Term, Type, entity
 from socialai_dsl.source import DataPath
-from socialai_dsl.vocabulary import COLORS, is_plain, normal
+from socialai_dsl.vocabulary import COLORS, first_alike, is_plain
 
 _RANGE: Final = re.compile(r"(-?\d+)\.\.(-?\d+)")
 _MOST: Final = 256
@@ -34,10 +34,14 @@ def _filled(
     symbols: Symbols, name: str, entries: tuple[str | int, ...], path: DataPath, findings: Findings
 ) -> FilledSlot:
     found: list[Entry] = []
+    known: dict[str, str] = {}
     for place, raw in findings.each(path, entries):
+        findings.must_be_one_line(place, str(raw))
         for word, value in _entries(symbols, raw, place, findings):
-            if normal(word) in {normal(other) for other, _ in found}:
-                raise findings.fail("S213", f"`{word}` is in the slot `{name}` already", findings.at(place))
+            first = first_alike(word, known)
+            if first is not None:
+                same = "is in" if first == word else f"is heard as `{first}`, which is in"
+                raise findings.fail("S213", f"`{word}` {same} the slot `{name}` already", findings.at(place))
             found.append((word, value))
     if len(found) > _MOST:
         message = f"a slot has at most {_MOST} values, this one {len(found)}"

@@ -115,9 +115,10 @@ def _shared(
     """The templates, or the words of a slot, in the suite, and each member's own index of each."""
     if how == "concat":
         return _concatenated(lists)
-    words = tuple(dict.fromkeys(word for own in lists for word in own)) if how == "union" else written
-    maps = ({word: i for i, word in enumerate(own)} for own in lists)
-    return words, tuple(tuple(own.get(word, -1) for word in words) for own in maps)
+    known = {normal(word): word for own in reversed(lists) for word in reversed(own)}
+    words = tuple({known[normal(word)]: None for own in lists for word in own}) if how == "union" else written
+    maps = ({normal(word): i for i, word in enumerate(own)} for own in lists)
+    return words, tuple(tuple(own.get(normal(word), -1) for word in words) for own in maps)
 
 
 def _concatenated(

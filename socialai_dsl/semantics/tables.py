@@ -6,7 +6,16 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.resolver import ANY_TEXT, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, described, quoted, reset_scope, spoken, surviving
+from socialai_dsl.semantics.scope import (
+    KEY,
+    FailedError,
+    Scope,
+    described,
+    quoted,
+    reset_scope,
+    spoken,
+    surviving,
+)
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
@@ -111,6 +120,8 @@ def _resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Ter
         return _permuted(resolver, name, written, path)
     if not written:
         raise resolver.findings.fail("S106", "a table has at least one key", resolver.findings.at(path))
+    for key in written:
+        resolver.findings.must_be_one_line((*path, key, KEY), key)
     words = [_word(resolver, (*path, key), raw) for key, raw in written.items()]
     return tuple(written), _as_values(words)
 
@@ -119,6 +130,8 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
     """What a value of a table is called: a word, a number, a text."""
     if isinstance(raw, str):
         text = raw.strip()
+        if not resolver.findings.must_be_one_line(path, text):
+            raise FailedError
         if is_plain(text, "'-") or not text.strip(" '-"):
             return text
     term = resolver.written(raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]

@@ -661,16 +661,18 @@ def may_find_nothing(term: Term) -> bool:
 
     What `prev` noted may have found nothing then, and a register may hold nothing.
     """
-    for part in walk(term):
-        if isinstance(part, HeardNoun) or is_own_noun(part):
-            return True
-        if isinstance(part, Quantification) and part.op in ("first", "pick", "nearest"):
-            return True
-        if isinstance(part, Read) and (part.path.startswith(NOTED) or part.nothing is not None):
-            return True
-        if isinstance(part, ReadEach) and part.may_miss:
-            return True
-    return False
+    return any(map(is_looked_for, walk(term)))
+
+
+def is_looked_for(part: object) -> bool:
+    """Whether one term, apart from what it is made of, may find nothing."""
+    if isinstance(part, HeardNoun) or (isinstance(part, World) and is_own_noun(part)):
+        return True
+    if isinstance(part, Quantification):
+        return part.op in ("first", "pick", "nearest")
+    if isinstance(part, Read):
+        return part.path.startswith(NOTED) or part.nothing is not None
+    return isinstance(part, ReadEach) and part.may_miss
 
 
 def is_own_noun(term: Term) -> bool:

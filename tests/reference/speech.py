@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -28,9 +29,17 @@ def noun_values(world: World) -> list[str | int]:
     return [noun_value(noun) for noun in world.nouns]
 
 
+def plain(text: str) -> str:
+    """A text without case, in plain forms of its letters, and without what only tells how others are shown."""
+    forms = unicodedata.normalize("NFKC", text).casefold()
+    shown = [c for c in forms if unicodedata.category(c) != "Cf" and not 0xFE00 <= ord(c) <= 0xFE0F]
+    return unicodedata.normalize("NFKC", "".join(shown)).replace("\u2019", "'")
+
+
 def canonical(text: str) -> str:
-    """Matching ignores case, a final `.`, `!` or `?`, and how many blanks there are."""
-    return re.sub(r"[.!?]$", "", " ".join(text.split())).lower()
+    """Matching ignores forms of letters, case, final `.`, `!` or `?`, and how many blanks there are."""
+    blanks = " ".join(plain(text).split())
+    return re.sub(r"[.!?\u3002]+$", "", blanks).strip() or blanks
 
 
 def meaning(world: World, filler: Filler) -> Any:
@@ -130,6 +139,17 @@ def pair(world: World, grammar: Grammar, number: int) -> tuple[str, dict[str, An
     return grammar.utterance(*spoken), filled(world, grammar, *spoken)
 
 
+UNSPACED = ("THAI", "LAO", "MYANMAR", "KHMER", "HIRAGANA", "KATAKANA", "CJK")
+"""How the names of letters begin in scripts without blanks."""
+
+
 def words(text: str) -> list[str]:
-    """Lower-cased maximal runs of letters, digits and apostrophes."""
-    return re.findall(r"[a-z0-9']+", text.lower())
+    """Runs of letters, digits and apostrophes, with their marks; letters of scripts without blanks stand alone."""
+    pattern = ""
+    text = plain(text)
+    for c in text:
+        kind = unicodedata.category(c)[0]
+        letter = c.isalnum() or c == "'"
+        alone = letter and unicodedata.name(c, "").startswith(UNSPACED)
+        pattern += "A" if alone else "L" if letter else "M" if kind == "M" else " "
+    return [text[m.start() : m.end()] for m in re.finditer("AM*|L[LM]*", pattern)]

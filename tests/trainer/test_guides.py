@@ -157,6 +157,21 @@ class Guide:
 """
 
 
+def test_a_guide_that_does_what_cannot_be_done_is_told_so(small_config: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        NOBODY.replace("np.zeros(count, np.float32)", "np.ones(count, np.float32)")
+    )
+    (tmp_path / "wrong.py").write_text(
+        (tmp_path / "mine.py")
+        .read_text()
+        .replace("np.zeros((count, 4), np.int64)", "np.full((count, 4), 99)")
+    )
+    scenario = str(tmp_path / "any.yaml")
+    collect(Session.start(guided(small_config, guide="mine:Guide", scenario=scenario), envs()))
+    with pytest.raises(ValueError, match=r"guide: got the action \[99, 99, 99, 99\] in row 0, expected"):
+        collect(Session.start(guided(small_config, guide="wrong:Guide", scenario=scenario), envs()))
+
+
 def test_a_guided_run_stopped_and_resumed_ends_with_the_same_bits(tmp_path: Path, small_config: Any) -> None:
     class Stop(Exception):  # noqa: N818 - it interrupts, as KeyboardInterrupt does
         pass

@@ -33,15 +33,17 @@ class Plainly(yaml.SafeDumper):
 
 @pytest.fixture
 def examine(tmp_path):
-    """Check the base scenario with some of its sections changed; `None` takes a section out."""
+    """Check the base scenario with some of its sections changed; `None` takes a section out, `remove` members."""
 
-    def examined(**sections):
+    def examined(remove=(), **sections):
         data = copy.deepcopy(BASE)
         for key, value in sections.items():
             if isinstance(value, dict) and isinstance(data.get(key), dict):
                 data[key] = {**data[key], **value}
             else:
                 data[key] = value
+        for member in remove:
+            del data["cast"][member]
         file = tmp_path / "small.yaml"
         kept = {key: value for key, value in data.items() if value is not None}
         file.write_text(yaml.dump(kept, Dumper=Plainly, sort_keys=False))

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
+from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import Const, Heard, Logic, Operation, Quantification, Read
+from socialai_dsl.vocabulary import PRIMITIVES
 
 
 def frame(**states):
@@ -196,3 +200,75 @@ def test_registers_of_an_unplayed_frame_are_looked_at_but_never_drawn(meaning, m
         str(getattr(s, "path", "")).split(".")[-1] == "n" for s in meaning(frames=frames("n + 1")).setup
     )
     assert [line[:4] for line in mistakes(frames=frames("m + 1"))] == ["S201"]
+
+
+NEEDS = {
+    **{word: (word,) for word in ("left", "right", "forward", "toggle", "pickup", "drop")},
+    "turn(left)": ("left",),
+    **dict.fromkeys(("face(toy)", "turn_to(up)", "turn(side)"), ("left", "right")),
+    "choose(left | toggle)": ("left", "toggle"),
+    "perform(dance)": ("right", "pickup"),
+    **dict.fromkeys(
+        (
+            *("go_to(toy)", "go_next_to(toy)", "search(toy)", "follow(guide)", "flee(guide)", "wander"),
+            *("stay_near(guide, 2)", "push(stone, up)", "enter(mat)"),
+        ),
+        ("left", "right", "forward"),
+    ),
+    "use(gate)": ("left", "right", "forward", "toggle"),
+    "enter(gate)": ("left", "right", "forward", "toggle"),
+    "fetch(toy)": ("left", "right", "forward", "pickup"),
+    "give(toy, guide)": ("left", "right", "forward", "drop"),
+    "bring(toy, guide)": ("left", "right", "forward", "pickup", "drop"),
+    "stay": (),
+}
+"""Activity -> the body actions that the agent needs for it."""
+
+THINGS = {
+    "toy": {"type": "ball", "carryable": True},
+    "stone": {"type": "marble"},
+    "mat": {"type": "floor", "place": "anywhere"},
+    "gate": {"type": "door", "place": "wall(top)"},
+}
+
+
+def scripted(do, member, actions):
+    lets = {"dance": {"sequence": 2, "moves": ["right", "pickup"]}}
+    if "side" in do:
+        lets["side"] = "pick(left | right)"
+    cast = {"guide": {}, "agent": {}}
+    cast[member] = {"frame": "solve"}
+    steps = {"solve": {"steps": [{"do": do, "for": 3}]}}
+    return {"objects": THINGS, "let": lets, "frames": steps, "cast": cast, "actions": list(actions)}
+
+
+def test_every_activity_is_known_by_the_actions_that_it_needs():
+    npcs = {"point", "point_at", "stop_pointing"}
+    assert {do.partition("(")[0] for do in NEEDS} == ACTIVITIES.keys() - npcs
+
+
+@pytest.mark.parametrize("do", NEEDS)
+def test_a_script_needs_actions_that_the_agent_has(examine, do):
+    """With exactly these it is right, and without any of them it is not; an NPC has all actions."""
+    needed = NEEDS[do]
+    assert not examine(**scripted(do, "agent", needed or ["done"])).has_errors
+    for lacking in needed:
+        others = [action for action in PRIMITIVES if action != lacking]
+        (found,) = [d for d in examine(**scripted(do, "agent", others)).diagnostics if d.code[0] == "S"]
+        assert found.code == "S320"
+        assert f"`{lacking}`" in found.message
+        assert not examine(**scripted(do, "guide", others)).has_errors
+
+
+def test_a_frame_that_nobody_plays_is_nobody_s(examine):
+    """Without any NPC it is not taken for the agent's, and without who plays it its beliefs are not missed."""
+    rules = [
+        {"hears": "How are you", "say": "Here I am, <self.believes.seen_at>", "to": "speaker", "goto": "b"},
+        {"when": "was_poked and eye_contact(agent)", "say": "Ouch", "cause": ["self.vanish"]},
+    ]
+    states = {"a": {"do": "point(exit)", "then": rules}, "b": {"do": "point_at(exit)"}}
+    frames = {"talk": {"states": states}}
+    believing = {"frame": "talk", "beliefs": {"seen_at": {"of": "exit.x"}}}
+    assert not examine(frames=frames, cast={"guide": believing}).has_errors
+    assert not examine(frames=frames, cast={"guide": {}}).has_errors
+    assert not examine(frames=frames, cast={"guide": believing}, remove=["guide"]).has_errors

@@ -35,3 +35,58 @@ def test_one_of_several_may_have_any_of_its_values(mistakes, number, codes):
         outcome=[{"success": f"one.n == {number}"}, LEAVES],
     )
     assert [line[:4] for line in found] == codes
+
+
+SOMETIMES = "first(d in doors where d.color == red)"
+"""What finds nothing in rooms without a red door."""
+
+
+@pytest.mark.parametrize(
+    ("above", "dead"),
+    [
+        ({"say": "Yes"}, True),
+        ({"when": True, "say": "Yes"}, True),
+        ({"when": "true", "goto": "a"}, True),
+        ({"when": "agent.next_to(self)", "say": "<exit.color>"}, True),
+        ({"cause": ["those(d in doors where d.color == red).open"]}, True),
+        ({"say": f"The <{SOMETIMES}.color> one"}, False),
+        ({"say": "<last.color>"}, False),
+        ({"say": "Hm", "to": "nearest(p in cast where p.x == last.x to self)"}, False),
+        ({"say": "<n>", "set": {"n": f"{SOMETIMES}.x"}}, False),
+        ({"set": {"last": SOMETIMES}}, False),
+        ({"cause": [f"{SOMETIMES}.open"]}, False),
+        ({"cause": [f"self.put({SOMETIMES})"]}, False),
+        ({"when": "$on", "say": "Yes"}, False),
+        ({"when": "$on or n == 3", "say": "Yes"}, False),
+        ({"when": False, "say": "Yes"}, False),
+        ({"when": True, "once": True, "say": "Yes"}, False),
+        ({"when": True, "chance": 0.5, "say": "Yes"}, False),
+        ({"when": True, "after": 3, "say": "Yes"}, False),
+    ],
+)
+def test_a_rule_is_dead_only_if_the_one_above_fires_whenever_it_would(examine, above, dead):
+    below = {"when": "agent.next_to(self)", "say": "Or not"}
+    registers = {"n": {"start": 0, "range": "0..9"}, "last": {"start": "none"}}
+    known = {"when": "t == 19", "set": {"last": "exit"}}
+    frame = {"let": registers, "states": {"a": {"first": [known], "then": [above, below]}}}
+    doors = {"doors": {"type": "door", "count": 4, "place": "each_wall(2)", "color": "random"}}
+    cast = {"guide": {"frame": "talk"}}
+    found = examine(params={"on": True}, objects=doors, frames={"talk": frame}, cast=cast)
+    assert not found.has_errors, [str(d) for d in found.diagnostics]
+    assert ("W311" in {d.code for d in found.diagnostics}) is dead
+
+
+@pytest.mark.parametrize(
+    ("hears", "say", "dead"),
+    [
+        ("Where is <noun>", "<noun>", True),
+        ("Where is <noun>", "<agent.noun>", True),
+        ("any", "<agent.noun>", False),
+    ],
+)
+def test_what_a_rule_heard_is_found(examine, hears, say, dead):
+    rules = [{"hears": hears, "say": say}, {"hears": "Where is sesame", "say": "Sesame"}]
+    if hears == "any":
+        rules = [{"when": "agent.spoke", "say": say}, {"when": "agent.spoke", "say": "Sesame"}]
+    found = examine(frames={"talk": {"states": {"a": {"then": rules}}}}, cast={"guide": {"frame": "talk"}})
+    assert [d.code for d in found.diagnostics if d.code == "W311"] == ["W311"] * dead
