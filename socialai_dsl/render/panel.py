@@ -1,6 +1,8 @@
 """A frame of an episode's film: the room, and the dialogue beside it."""
 
+import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -127,7 +129,8 @@ def compose_frame(
     y = height - foot
     for row, text in enumerate(caption):
         fill = INK if row == 0 else _MUTED
-        draw.text((left, y), _shorten(text, panel, _CAPTION_SIZE), font=_font(_CAPTION_SIZE), fill=fill)
+        shown = _shorten(text, panel, _CAPTION_SIZE)
+        draw.text((left, y), shown, font=_font(_CAPTION_SIZE, shown), fill=fill)
         y += _CAPTION_SIZE + 6
     return np.asarray(frame, dtype=np.uint8).copy()
 
@@ -147,7 +150,7 @@ def _draw_cast(
         look = Image.fromarray(face.look).resize((_FACE_SIZE, _FACE_SIZE), Image.Resampling.LANCZOS)
         frame.paste(look, (x, y))
         text = _shorten(face.label, column - _FACE_SIZE - 8, _CAPTION_SIZE)
-        draw.text((x + _FACE_SIZE + 5, y + 5), text, font=_font(_CAPTION_SIZE), fill=INK)
+        draw.text((x + _FACE_SIZE + 5, y + 5), text, font=_font(_CAPTION_SIZE, text), fill=INK)
     rows = -(-len(cast) // 2)
     return rows * (_FACE_SIZE + 4) + (4 if rows else 0)
 
@@ -166,10 +169,10 @@ def _draw_line(
     for number, row in enumerate(rows):
         x = float(_MARGIN)
         if number == 0 and name:
-            draw.text((x, y), name, font=_font(_TEXT_SIZE), fill=speaker)
+            draw.text((x, y), name, font=_font(_TEXT_SIZE, name), fill=speaker)
             x += _width(name, _TEXT_SIZE)
             row = row.removeprefix(name.rstrip()).lstrip()
-        draw.text((x, y), row, font=_font(_TEXT_SIZE), fill=ink)
+        draw.text((x, y), row, font=_font(_TEXT_SIZE, row), fill=ink)
         y += _LINE_HEIGHT
     return y + 4
 
@@ -196,9 +199,58 @@ def _shorten(text: str, width: int, size: int) -> str:
 
 
 def _width(text: str, size: int) -> float:
-    return _font(size).getlength(text)
+    return _font(size, text).getlength(text)
+
+
+_FALLBACKS: Final = (
+    *("DejaVuSans.ttf", "NotoSans-Regular.ttf", "Arial Unicode.ttf", "arialuni.ttf"),
+    *("NotoSansCJK-Regular.ttc", "msyh.ttc", "PingFang.ttc", "NotoSansThai-Regular.ttf", "unifont.ttf"),
+)
+"""Fonts of systems, tried in order where Pillow's own lacks a letter; it has little beyond those of English."""
+
+_NO_LETTER: Final = "\U0010ffff"
+"""What no font has, so that it shows what a font draws for what it lacks."""
+
+
+def _font(size: int, text: str = "") -> _Font:
+    """Pillow's own font or, of a text that has other letters, the first font here that has them all.
+
+    Warns once of letters that none has.
+    """
+    lacking = {character for character in text if not _has(size, 0, character)}
+    if not lacking:
+        return _fonts(size)[0]
+    fonts = _fonts(size)
+    missing = [{c for c in text if not _has(size, number, c)} for number in range(len(fonts))]
+    best = min(range(len(fonts)), key=lambda number: len(missing[number]))
+    if missing[best]:
+        _warn_of("".join(sorted(missing[best])))
+    return fonts[best]
 
 
 @lru_cache(maxsize=8)
-def _font(size: int) -> _Font:
-    return ImageFont.load_default(size=size)
+def _fonts(size: int) -> tuple[_Font, ...]:
+    """Pillow's own font, then those of the fallbacks that this machine has."""
+    found: list[_Font] = [ImageFont.load_default(size=size)]
+    for name in _FALLBACKS:
+        with suppress(OSError):
+            found.append(ImageFont.truetype(name, size))
+    return tuple(found)
+
+
+@lru_cache(maxsize=4096)
+def _has(size: int, number: int, character: str) -> bool:
+    """Whether a font can draw a character."""
+    font = _fonts(size)[number]
+    if not character.isprintable() or character.isspace() or not isinstance(font, ImageFont.FreeTypeFont):
+        return True
+    drawn, nothing = font.getmask(character), font.getmask(_NO_LETTER)
+    return (drawn.size, bytes(drawn)) != (nothing.size, bytes(nothing))
+
+
+@lru_cache(maxsize=256)
+def _warn_of(characters: str) -> None:
+    warnings.warn(
+        f"no font of this machine has {characters!r}, so pictures show boxes; Noto Sans has more letters",
+        stacklevel=2,
+    )

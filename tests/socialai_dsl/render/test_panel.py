@@ -1,8 +1,11 @@
 """The picture of an episode: room, dialogue, caption."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
+from socialai_dsl.render import panel
 from socialai_dsl.render.panel import DialogueLine, Face, compose_frame, draw_dialogue
 
 LINES = [DialogueLine(t, "You" if t % 2 else "Ann", f"utterance number {t}") for t in range(1, 60)]
@@ -63,3 +66,33 @@ def test_the_cast_is_shown_above_the_dialogue() -> None:
     assert faces(shown(20)).sum() == 6 * one, "of many the first"
     below = [np.nonzero(faces(shown(count)))[0].max() for count in (2, 3)]
     assert below[0] < below[1], "two in a row"
+
+
+@pytest.fixture
+def no_other_font(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A machine without the fonts that are tried."""
+    monkeypatch.setattr(panel, "_FALLBACKS", ())
+    for cached in (panel._fonts, panel._has, panel._warn_of):
+        cached.cache_clear()
+    yield
+    for cached in (panel._fonts, panel._has, panel._warn_of):
+        cached.cache_clear()
+
+
+def test_letters_that_no_font_has_are_warned_of_once(no_other_font: None) -> None:
+    lines = [DialogueLine(1, "Ann", "\u4f60\u597d"), DialogueLine(2, "Ann", "\u597d\u4f60")]
+    with pytest.warns(UserWarning, match="no font of this machine has '\u4f60\u597d'") as told:
+        first = draw_dialogue(lines, 300, 200)
+    assert len(told) == 1
+    assert (draw_dialogue(lines, 300, 200) == first).all(), "warnings are errors here"
+
+
+def test_letters_of_english_are_drawn_in_one_font_and_without_a_warning() -> None:
+    assert panel._font(14, "Where is the exit? It's \u2026") is panel._font(14)
+
+
+def test_a_font_that_has_the_letters_is_taken() -> None:
+    """Where this machine has one of the fallbacks."""
+    if len(panel._fonts(14)) > 1 and panel._has(14, 1, "\u0436"):
+        assert panel._font(14, "\u0436\u0443\u043a") is panel._fonts(14)[1]
+    assert not panel._has(14, 0, "\u0436")
