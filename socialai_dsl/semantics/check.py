@@ -340,8 +340,8 @@ def _report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> 
     called: dict[tuple[str, ...], tuple[str, str]] = {}
     for member, name in zip(symbols.cast, names, strict=True):
         for text in words_of_values(name.type):
-            first, known = called.setdefault(tuple(words(text)), (member, _shown(text)))
-            if first != member and known != _shown(text):
+            first, known = called.setdefault(tuple(words(text)), (member, text))
+            if first != member and known != text:
                 message = (
                     f"`{text}` and `{known}`, which `{first}` is called, are one name to a trained agent"
                 )

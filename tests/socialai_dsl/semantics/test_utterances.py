@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.frontend import load
-from socialai_dsl.vocabulary import normal, words
+from socialai_dsl.vocabulary import COLORS, normal, words
 
 
 @pytest.mark.parametrize("text", ["Open sesame", " open  SESAME. ", "open sesame!?"])
@@ -64,3 +64,82 @@ def test_words_that_run_together_are_words_of_their_own(meaning):
     frames = {"talk": {"states": {"a": {"then": [{"say": "very <exit.color>ish"}]}}}}
     vocabulary = meaning(frames=frames, cast={"guide": {"frame": "talk"}}).words_in_order
     assert {"redish", "greyish"} <= set(vocabulary)
+
+
+NOT_ONE_LINE = ("A\nB", "A\rB", "A\tB", "\nA\tB\n")
+
+
+@pytest.mark.parametrize("text", NOT_ONE_LINE)
+@pytest.mark.parametrize(
+    "place", ["say", "with", "hears", "name", "noun", "template", "table", "ask", "said"]
+)
+def test_whatever_is_said_or_named_is_one_line(examine, place, text):
+    """So that nothing reads as the line of somebody else."""
+    rule = {"hears": "How are you", "say": text if place == "say" else "Hm"}
+    if place == "hears":
+        rule["hears"] = text
+    sections = {
+        "frames": {"talk": {"slots": {"line": "text"}, "states": {"a": {"then": [rule, {"say": "<line>"}]}}}},
+        "cast": {"guide": {"frame": "talk", "with": {"line": text if place == "with" else "Yes"}}},
+        "tables": {"word": dict.fromkeys(COLORS, text if place == "table" else "a")},
+        "let": {"exit": "pick(doors)"},
+        "outcome": [
+            {"success": f'agent.at(exit) and agent.said("{text if place == "said" else "How are you"}")'}
+        ],
+        "probes": {"p": {"ask": text if place == "ask" else "Open?", "answer": "exit.open"}},
+    }
+    if place == "name":
+        sections["cast"]["guide"]["name"] = text
+    nouns, templates = ["you", "me"], ["How are <noun>"]
+    sections["grammar"] = {
+        "templates": [*templates, f"{text} <noun>"] if place == "template" else templates,
+        "nouns": [*nouns, text] if place == "noun" else nouns,
+    }
+    found = {d.code for d in examine(**sections).diagnostics}
+    # Within quotes in an expression a line break has no place at all.
+    assert "S405" in found or (place == "said" and found == {"S203"})
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "codes"),
+    [
+        ("Ann", "Bob", []),
+        ("Ann", "Ann", []),
+        ("Ann", "ANN", ["W406"]),
+        ("Ann", "\uff21nn", ["W406"]),
+        ('"\U0001f98a"', '"\U0001f43b"', ["W406"]),
+        ('"Bob: Ann"', "Bob", ["S405"]),
+        ('"Bob\uff1a Ann"', "Bob", ["S405"]),
+    ],
+)
+def test_names_are_one_speaker_to_all_who_hear_them(examine, name, others, codes):
+    found = examine(cast={"guide": {"name": name}, "other": {"name": others}}).diagnostics
+    assert [d.code for d in found] == codes
+
+
+@pytest.mark.parametrize(
+    ("lines", "names", "codes"),
+    [
+        (("Yes!", "Yes?"), "shown", ["W406"]),
+        (("Yes", "Yes"), "shown", []),
+        (("Yes", "No"), "shown", []),
+        (("\U0001f642", "\U0001f641"), "shown", ["W406"]),
+        (("Caf\u00e9", "Cafe\u0301"), "shown", []),
+    ],
+)
+def test_texts_that_only_people_tell_apart(examine, lines, names, codes):
+    first, second = ({"hears": "How are you", "when": f"t == {t}", "say": say} for t, say in enumerate(lines))
+    frames = {"talk": {"states": {"a": {"then": [first, second]}}}}
+    found = examine(frames=frames, cast={"guide": {"frame": "talk"}}, observe={"names": names}).diagnostics
+    assert [d.code for d in found if d.code != "W311"] == codes
+
+
+@pytest.mark.parametrize(("who", "codes"), [("shown", []), ("hidden", ["W406"])])
+def test_who_says_it_tells_texts_apart_unless_names_are_hidden(examine, who, codes):
+    frames = {
+        name: {"states": {"a": {"then": [{"hears": "How are you", "say": say}]}}}
+        for name, say in (("first", "Yes!"), ("second", "Yes?"))
+    }
+    cast = {"guide": {"frame": "first"}, "other": {"frame": "second"}}
+    found = examine(frames=frames, cast=cast, observe={"names": who}).diagnostics
+    assert [d.code for d in found] == codes
