@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from socialai_dsl.loader.reader import shipped_folder
+from trainer.shipped import agents_folder
 
 ROOT = Path(__file__).parents[2]
 DIAGNOSTICS = ROOT / "tests" / "diagnostics"
@@ -85,10 +86,10 @@ class Playground:
         os.symlink(place / "outside" / "secret.yaml", self.folder / "link.yaml")
         os.symlink(place / "outside", self.folder / "linked")
         os.symlink("loop.yaml", self.folder / "loop.yaml")
-        self._allowed = (self.folder, shipped_folder().resolve())
+        self._allowed = (self.folder, shipped_folder().resolve(), agents_folder())
 
     def outside(self, ear: Ear) -> list[str]:
-        """What was opened or listed that lies neither in the folder nor among the shipped scenarios."""
+        """What was opened or listed that lies neither in the folder nor among the scenarios and agents that ship."""
         real = [Path(os.path.realpath(path)) for path in ear.opened]
         return [
             str(path) for path in real if not any(path.is_relative_to(folder) for folder in self._allowed)
