@@ -16,6 +16,7 @@ TEXT_SIDE = {
     "diagnostics",
     "draws",
     "vocabulary",
+    "widths",
     "grammar",
     "schema",
     "semantics",
@@ -42,12 +43,13 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "diagnostics": ({"source", "vocabulary"}, set()),
     "draws": (set(), {"numpy", "numba"}),
     "vocabulary": (set(), set()),
-    "grammar": ({"source", "diagnostics", "vocabulary"}, {"lark"}),
+    "widths": (set(), set()),
+    "grammar": ({"source", "diagnostics", "vocabulary", "widths"}, {"lark"}),
     "schema": (
         {"source", "diagnostics", "errors", "vocabulary", "grammar"},
         {"pydantic", "pydantic_core", CONFIG},
     ),
-    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "grammar", "schema"}, set()),
+    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "widths", "grammar", "schema"}, set()),
     "loader": (
         TEXT_SIDE - {"frontend", "checking", "library"},
         {"yaml", "pydantic", "pydantic_core"},
@@ -56,14 +58,14 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "checking": (TEXT_SIDE - {"frontend"}, {SHIPPED}),
     "frontend": (TEXT_SIDE, set()),
     "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
-    "program": ({"source", "vocabulary"}, {"numpy"}),
+    "program": ({"source", "vocabulary", "widths"}, {"numpy"}),
     "program_suite": ({"program", "vocabulary"}, set()),
     "compiler": (
         TEXT_SIDE - {"loader", "library", "checking", "frontend"} | {"program"},
         {"numpy"},
     ),
     "compilation": (TEXT_SIDE - {"frontend"} | {"program", "program_suite", "compiler"}, set()),
-    "engine": ({"program", "draws", "vocabulary"}, {"numpy", "numba"}),
+    "engine": ({"program", "draws", "vocabulary", "widths"}, {"numpy", "numba"}),
     "render": ({"program", "library", "vocabulary"}, {"numpy", "PIL"}),
     "envs": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "render"},
@@ -242,7 +244,7 @@ def test_engine_and_compiler_do_not_know_each_other() -> None:
     """The point of the table, said on its own so that nobody relaxes it by editing a set."""
     for own, other in (("engine", "compiler"), ("compiler", "engine")):
         assert other not in MAY_IMPORT[own][0]
-        assert not MAY_IMPORT["engine"][0] & (TEXT_SIDE - {"draws", "vocabulary"})
+        assert not MAY_IMPORT["engine"][0] & (TEXT_SIDE - {"draws", "vocabulary", "widths"})
 
 
 @pytest.mark.parametrize(

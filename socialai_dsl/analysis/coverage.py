@@ -65,8 +65,8 @@ class _Seen:
             name.path: name.register for name in self.program.registers if name.path.endswith(".frame")
         }
 
-    def watch(self, registers: NDArray[np.int16]) -> None:
-        """Note which states frames are in, in registers of rows, int16 (S, R)."""
+    def watch(self, registers: NDArray[np.int32]) -> None:
+        """Note which states frames are in, in registers of rows, int32 (S, R)."""
         for path, register in self._frames.items():
             self.states.setdefault(path, set()).update(np.unique(registers[:, register]).tolist())
 

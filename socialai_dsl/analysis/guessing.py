@@ -80,7 +80,7 @@ class Guess:
 class _Together:
     """States of all rooms together that are reached in the same number of steps: (S, rooms, ...)."""
 
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     boards: NDArray[np.uint32]
     keys: NDArray[np.uint64]
     going: NDArray[np.bool_]
@@ -127,7 +127,7 @@ class Guessing:
 
     def solve(
         self,
-        registers: NDArray[np.int16],
+        registers: NDArray[np.int32],
         boards: NDArray[np.uint32],
         keys: NDArray[np.uint64],
         effort: Effort,
@@ -151,7 +151,7 @@ class Guessing:
         return self._walked(start, (), _WALKS) or self._searched(start, effort.states)
 
     def _start(
-        self, registers: NDArray[np.int16], boards: NDArray[np.uint32], keys: NDArray[np.uint64]
+        self, registers: NDArray[np.int32], boards: NDArray[np.uint32], keys: NDArray[np.uint64]
     ) -> _Together:
         """The rooms as they begin."""
         state = self._table.state
@@ -165,7 +165,7 @@ class Guessing:
 
     def first_difference(
         self,
-        registers: NDArray[np.int16],
+        registers: NDArray[np.int32],
         boards: NDArray[np.uint32],
         keys: NDArray[np.uint64],
         effort: Effort,
@@ -340,7 +340,7 @@ class Guessing:
         )
         return reached, self._look_alike(reached.going, self._observed(registers).reshape(-1, rooms))
 
-    def _observed(self, registers: NDArray[np.int16]) -> NDArray[np.int64]:
+    def _observed(self, registers: NDArray[np.int32]) -> NDArray[np.int64]:
         """A number for what the agent sees and has just heard, (rows,)."""
         size = self._heard.stop - self._heard.start
         spoken = np.arange(size) < registers[:, [Register.HEARD]]

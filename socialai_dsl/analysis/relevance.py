@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.program import (
-    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     SECRET,
@@ -28,10 +27,12 @@ from socialai_dsl.program import (
     OpClass,
     Program,
     Register,
+    constant_of,
 )
 from socialai_dsl.program.instructions import TABLE
+from socialai_dsl.widths import REGISTER, WHOLE_REGISTER
 
-_UNLIMITED = np.iinfo(np.int16).max
+_UNLIMITED = WHOLE_REGISTER[1]
 _ADDRESSES = (Header.SETTLE_PC, Header.RULES_PC, Header.BEFORE_PC, Header.LINKS_PC, Header.TICK_PC)
 
 _OF_ONE_STEP = (
@@ -86,14 +87,14 @@ class Relevance:
     """
 
     registers: NDArray[np.intp]
-    limits: NDArray[np.int16]
+    limits: NDArray[np.int32]
     whole_utterance: bool
     chance: bool
     drawn: bool
     choices: tuple[tuple[int, int], ...] | None
 
-    def of_rows(self, registers: NDArray[np.int16]) -> NDArray[np.int16]:
-        """What matters of registers, int16 (..., R), as int16 (..., N)."""
+    def of_rows(self, registers: NDArray[np.int32]) -> NDArray[np.int32]:
+        """What matters of registers, int32 (..., R), as int32 (..., N)."""
         return np.minimum(np.take(registers, self.registers, axis=-1), self.limits)
 
     @classmethod
@@ -117,7 +118,7 @@ class Relevance:
         counting = {Register.T, *_clocks(program)}
         return cls(
             np.array(kept, np.intp),
-            np.array([limits[r] if r in counting else _UNLIMITED for r in kept], np.int16),
+            np.array([limits[r] if r in counting else _UNLIMITED for r in kept], REGISTER),
             any(register in limits for register in _WHOLE_UTTERANCE)
             or any(op == Op.HEARD_NOUN for block in blocks for op, _ in block),
             any(_draws_matter(program, block) for block in blocks),
@@ -167,8 +168,8 @@ def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
                 if not 0 <= register < TEMPORARY:
                     continue
                 limit = _UNLIMITED
-                if op in _COMPARISONS and operands[1 - position] >= CONSTANT // 2:
-                    limit = min(max(operands[1 - position] - CONSTANT, -1) + 1, _UNLIMITED)
+                if op in _COMPARISONS and (bound := constant_of(operands[1 - position])) is not None:
+                    limit = max(bound, -1) + 1
                 limits[register] = max(limits.get(register, 0), limit)
     return limits
 

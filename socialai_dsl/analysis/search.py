@@ -95,7 +95,7 @@ def search_rooms(
 class _Layer:
     """States that are reached in the same number of steps, and how: (S, ...) each."""
 
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     boards: NDArray[np.uint32]
     keys: NDArray[np.uint64]
     nodes: NDArray[np.int64]  # number of each state in the tree
@@ -107,14 +107,14 @@ class Search:
     Args:
         program: what is played.
         goals: names of the outcomes that are looked for; None: the successes.
-        witness: is shown the registers, int16 (S, R), that every round of steps leads to.
+        witness: is shown the registers, int32 (S, R), that every round of steps leads to.
     """
 
     def __init__(
         self,
         program: Program,
         goals: Collection[str] | None = None,
-        witness: Callable[[NDArray[np.int16]], None] | None = None,
+        witness: Callable[[NDArray[np.int32]], None] | None = None,
     ) -> None:
         self._program = program
         self._witness = witness
@@ -134,13 +134,13 @@ class Search:
 
     def solve(
         self,
-        registers: NDArray[np.int16],
+        registers: NDArray[np.int32],
         board: NDArray[np.uint32],
         key: NDArray[np.uint64],
         states: int = STATES,
         clock: Clock | None = None,
     ) -> Finding:
-        """Search from one state: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,).
+        """Search from one state: registers, int32 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,).
 
         It is undecided as soon as the clock is over.
         """
@@ -180,7 +180,7 @@ class Search:
         return Finding(SearchVerdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
 
     def stumbles(
-        self, registers: NDArray[np.int16], board: NDArray[np.uint32], key: NDArray[np.uint64]
+        self, registers: NDArray[np.int32], board: NDArray[np.uint32], key: NDArray[np.uint64]
     ) -> bool:
         """Whether a success is found by acting at random from one state, as for `solve`, without other draws."""
         state, ports = self._table.state, self._table.batch.ports
@@ -247,7 +247,7 @@ class Search:
         )
         return None
 
-    def _digests(self, registers: NDArray[np.int16]) -> NDArray[np.uint64]:
+    def _digests(self, registers: NDArray[np.int32]) -> NDArray[np.uint64]:
         """One number for each state, (S,): equal for equal states, else almost surely different."""
         return digests_of(self._relevance.of_rows(registers))
 
@@ -328,10 +328,11 @@ def marks(chances: int) -> NDArray[np.uint64]:
     return np.array([mix(k * GOLDEN) & MASK if k else 0 for k in range(chances)], np.uint64)
 
 
-def digests_of(rows: NDArray[np.int16]) -> NDArray[np.uint64]:
-    """One number for each row of int16 (S, N), uint64 (S,): equal for equal rows, else almost surely different."""
-    words = -(-rows.shape[1] // 4)
-    packed = np.empty((len(rows), 4 * words), np.int16)
+def digests_of(rows: NDArray[np.int32]) -> NDArray[np.uint64]:
+    """One number for each row of int32 (S, N), uint64 (S,): equal for equal rows, else almost surely different."""
+    in_a_word = 8 // rows.itemsize
+    words = -(-rows.shape[1] // in_a_word)
+    packed = np.empty((len(rows), in_a_word * words), rows.dtype)
     packed[:, : rows.shape[1]], packed[:, rows.shape[1] :] = rows, 0
     parts = packed.view(np.uint64) * multipliers(words)
     parts ^= parts >> np.uint64(32)

@@ -175,12 +175,12 @@ class _Frames:
         self._states = table[:, FrameColumn.STATE]
         self._entered = [np.zeros(count, np.int64) for count in table[:, FrameColumn.STATES].tolist()]
 
-    def entered(self, registers: NDArray[np.int16]) -> None:
-        """Count the states that frames are in, in registers of rows, int16 (S, R)."""
+    def entered(self, registers: NDArray[np.int32]) -> None:
+        """Count the states that frames are in, in registers of rows, int32 (S, R)."""
         for register, entered in zip(self._states, self._entered, strict=True):
             entered += np.bincount(registers[:, register], minlength=len(entered))
 
-    def moved(self, before: NDArray[np.int16], after: NDArray[np.int16]) -> None:
+    def moved(self, before: NDArray[np.int32], after: NDArray[np.int32]) -> None:
         """Count the entries of `steps` that frames have gone to.
 
         In one turn a frame may leave several behind: those that are fulfilled already, and one that ends at once.

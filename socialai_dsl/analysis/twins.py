@@ -34,10 +34,10 @@ class Tellers:
         self._program, self._checked = program, checked
         self._before_npcs = bool(program.header(Header.FLAGS) & Flag.PICTURE_BEFORE_NPCS)
 
-    def between(self, table: Table, rows: tuple[int, int], before: NDArray[np.int16]) -> list[str]:
+    def between(self, table: Table, rows: tuple[int, int], before: NDArray[np.int32]) -> list[str]:
         """Members, objects or `SOMEBODY` behind all that differs between two rows since the last step.
 
-        `before` holds the registers of all rows before it, int16 (E, R). It is empty where only the walls differ.
+        `before` holds the registers of all rows before it, int32 (E, R). It is empty where only the walls differ.
         """
         heard = [table.heard(row) for row in rows]
         lines = set(heard[0]) ^ set(heard[1]) or {
@@ -61,7 +61,7 @@ class Tellers:
             if called is not None and line in table.heard(row) and line.startswith(f"{called}: "):
                 yield name_of(self._checked, entity.number)
 
-    def _called(self, entity: Entity, registers: NDArray[np.int16]) -> str | None:
+    def _called(self, entity: Entity, registers: NDArray[np.int32]) -> str | None:
         match entity.name:
             case Const(type=type_, value=value):
                 return type_.words[value - type_.low]
@@ -71,7 +71,7 @@ class Tellers:
         return None
 
     def _seen(
-        self, registers: NDArray[np.int16], before: NDArray[np.int16], differs: NDArray[np.bool_]
+        self, registers: NDArray[np.int32], before: NDArray[np.int32], differs: NDArray[np.bool_]
     ) -> Iterator[str]:
         """Who and what is shown in the cells that differ; the picture was taken before members moved, or after."""
         x, y, direction = (int(registers[FIRST_ENTITY + field]) for field in _PLACE)
@@ -185,7 +185,7 @@ class Twins:
                     cued.append(k)
         return TwinComparison(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
 
-    def _between(self, pair: int, before: NDArray[np.int16]) -> list[str]:
+    def _between(self, pair: int, before: NDArray[np.int32]) -> list[str]:
         return self._tellers.between(self._table, (2 * pair, 2 * pair + 1), before)
 
     def _leak(self, pair: int, step: int, by: Sequence[str]) -> Leak:

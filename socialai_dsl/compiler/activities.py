@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import NOWHERE, Label, constant, entity_register, label
+from socialai_dsl.compiler.assembler import NOWHERE, Label, entity_register, label
 from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.hands import is_member
-from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
+from socialai_dsl.program import MOST_CHOICES, Body, Field, Op, constant
 from socialai_dsl.semantics.plans import Activity, CheckedScenario
 from socialai_dsl.semantics.terms import (
     BOOL,

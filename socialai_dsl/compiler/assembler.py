@@ -10,7 +10,6 @@ from socialai_dsl.draws import site as site_number
 from socialai_dsl.program import (
     BOARDS,
     CELL,
-    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     TEMPORARIES,
@@ -26,16 +25,8 @@ from socialai_dsl.semantics.terms import ACTION, BOOL, Type, may_find_nothing
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import FINISHED
 
-LARGEST = CONSTANT // 2 - 1
-"""Greatest magnitude of a value that an operand word can hold."""
 _STATES_OF_AN_ANSWER = 255
 """States that `Op.ANSWER` has room for."""
-
-
-def constant(value: int) -> int:
-    """The operand word of a known value."""
-    assert -LARGEST <= value <= LARGEST, f"internal: the constant {value} does not fit into an operand"
-    return CONSTANT + value
 
 
 @dataclass(eq=False)
@@ -193,7 +184,7 @@ class CodeTable:
         return self._known[key]
 
 
-# -- registers: one row of int16 per environment -------------------------------------------------------------
+# -- registers: one row per environment -------------------------------------------------------------
 
 
 NOWHERE = CELL - 1

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from socialai_dsl.compiler.assembler import Label, age_path, constant
+from socialai_dsl.compiler.assembler import Label, age_path
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import Op
+from socialai_dsl.program import Op, constant
 from socialai_dsl.semantics.plans import BeliefPlan
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final
 
-from socialai_dsl.compiler.assembler import LARGEST, NOWHERE, Block, Label, Registers, Sites, constant
+from socialai_dsl.compiler.assembler import NOWHERE, Block, Label, Registers, Sites
 from socialai_dsl.compiler.folding import TRUE, Classes, Facts, Mobility, fold, mentions, substitute
-from socialai_dsl.program import CELL, TEMPORARY, Counting, Field, Op, Register
+from socialai_dsl.program import CELL, TEMPORARY, Counting, Field, Op, Register, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.terms import (
@@ -24,6 +24,7 @@ from socialai_dsl.semantics.terms import (
     may_be_nothing,
     may_find_nothing,
 )
+from socialai_dsl.widths import LARGEST_NUMBER
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +134,10 @@ class Emitter(ABC):
 
     def number(self, value: int) -> int:
         """The operand of a known value: a constant, or computed where it is too large for one."""
-        if -LARGEST <= value <= LARGEST:
+        if abs(value) <= LARGEST_NUMBER:
             return constant(value)
-        quotient, rest = divmod(value, LARGEST)
-        product = self.into_temporary(Op.MUL, self.number(quotient), constant(LARGEST))
+        quotient, rest = divmod(value, LARGEST_NUMBER)
+        product = self.into_temporary(Op.MUL, self.number(quotient), constant(LARGEST_NUMBER))
         return self.into_temporary(Op.ADD, product, constant(rest))
 
     def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
@@ -568,7 +569,7 @@ def _far(to: Emitter) -> int:
 # -- values: cheap where all conditions ask which number one value is -----------------------------------------
 
 
-_MASK_BITS = LARGEST.bit_length()
+_MASK_BITS = 19
 """How many numbers a set in one operand can tell apart."""
 _WORD_BITS = 63
 _MOST_NUMBERS = 1 << 12

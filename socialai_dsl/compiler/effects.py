@@ -13,7 +13,6 @@ from socialai_dsl.compiler.assembler import (
     Block,
     Label,
     Registers,
-    constant,
     entity_register,
     found_path,
     label,
@@ -25,7 +24,7 @@ from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, MemberSelection, sizes
-from socialai_dsl.program import CELL, Field, Op, Register
+from socialai_dsl.program import CELL, Field, Op, Register, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
     Assignment,

@@ -11,7 +11,6 @@ from typing import Final
 from socialai_dsl.compiler.assembler import (
     Label,
     Registers,
-    constant,
     entity_register,
     found_path,
     said_path,
@@ -35,7 +34,7 @@ from socialai_dsl.compiler.cells import (
 from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole
 from socialai_dsl.compiler.rows import row
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
+from socialai_dsl.program import Field, Op, Register, constant, is_temporary
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
@@ -199,7 +198,7 @@ class Expressions(Emitter):
         """The op takes the direction from where it leaves its answer."""
         facing = term.facing or terms.FieldOf(terms.DIRECTION, term.viewer, "dir")
         seen = self.value(facing)
-        if not TEMPORARY <= seen < CONSTANT // 2:
+        if not is_temporary(seen):
             seen = self.into_temporary(Op.LOAD, seen)
         target = self.value(term.target)
         self.block.emit(Op.SEES, seen, self.value(term.viewer), target)
@@ -342,7 +341,7 @@ class Expressions(Emitter):
     def sited_copy(self, sited: terms.SitedTerm) -> int:
         """The same in a temporary that nothing else changes or reads."""
         mark, value = self.block.taken, self.sited_value(sited)
-        if not TEMPORARY <= value < CONSTANT // 2:
+        if not is_temporary(value):
             value = self.into_temporary(Op.LOAD, value)
         return self.alone(mark, value)
 
@@ -351,7 +350,7 @@ class Expressions(Emitter):
         if self.block.taken <= _FEW:
             return value
         self.block.taken = mark
-        if not TEMPORARY + mark <= value < CONSTANT // 2:
+        if not is_temporary(value, mark):
             return value
         first = self.block.temporary()
         if value != first:

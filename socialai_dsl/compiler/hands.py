@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import Label, constant, entity_register
+from socialai_dsl.compiler.assembler import Label, entity_register
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import Field, Op
+from socialai_dsl.program import Field, Op, constant
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.terms import Term, numbers_of
 

@@ -9,7 +9,6 @@ from typing import Final
 from socialai_dsl.program import (
     BOARDS,
     CELL,
-    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     TEMPORARIES,
@@ -22,6 +21,7 @@ from socialai_dsl.program import (
     Op,
     Program,
     Register,
+    constant_of,
     room_words,
 )
 from socialai_dsl.program.instructions import (
@@ -34,7 +34,7 @@ from socialai_dsl.program.instructions import (
     Operand,
     hull,
 )
-from socialai_dsl.program.program import WHOLE_REGISTER
+from socialai_dsl.widths import WHOLE_REGISTER
 
 
 class PathFacts:
@@ -56,8 +56,8 @@ class PathFacts:
 
     def value(self, operand: int) -> Interval | None:
         """The range of an operand; None if it is nothing that can be read."""
-        if operand >= CONSTANT // 2:
-            return operand - CONSTANT, operand - CONSTANT
+        if (known := constant_of(operand)) is not None:
+            return known, known
         if operand >= TEMPORARY:
             return self.temporaries.get(operand - TEMPORARY)
         if operand in (Register.WIDTH, Register.HEIGHT) and not self.has_room:

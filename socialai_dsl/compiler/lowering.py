@@ -17,7 +17,7 @@ from socialai_dsl.compiler.activities import (
     Activities,
     has_aim,
 )
-from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
+from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, state_names
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
     DeferredRules,
@@ -43,7 +43,7 @@ from socialai_dsl.compiler.step_order import (
     way_after,
 )
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.program import Body, Header, Op
+from socialai_dsl.program import Body, Header, Op, constant
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import (
     FOR_EVER,

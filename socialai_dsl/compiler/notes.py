@@ -11,17 +11,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from socialai_dsl.compiler.assembler import Label, Registers, constant, label, state_names
+from socialai_dsl.compiler.assembler import Label, Registers, label, state_names
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
 from socialai_dsl.compiler.lowering import NoteTaker, RuleConditions
 from socialai_dsl.grammar.ast import unparse
-from socialai_dsl.program import Op, Program, RegisterName
+from socialai_dsl.program import Op, Program, RegisterName, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import CheckedScenario, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import BOOL, Const, Reading, Readings, Term, Type, all_of
+from socialai_dsl.widths import LARGEST_NUMBER
 
-_LEAST, _GREATEST = -32768, 32767
+_LEAST, _GREATEST = -LARGEST_NUMBER, LARGEST_NUMBER
 _MOST_VALUES = 6
 """The most values of a part that are noted."""
 _MOST_HEARD = 3

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.assembler import Label
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import Op, Program, RegisterName
+from socialai_dsl.program import Op, Program, RegisterName, constant
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.terms import BOOL
 

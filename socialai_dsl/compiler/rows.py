@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import Label, Registers, constant
+from socialai_dsl.compiler.assembler import Label, Registers
 from socialai_dsl.compiler.cells import Emitter, in_a_row
-from socialai_dsl.program import Op
+from socialai_dsl.program import Op, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Term
 

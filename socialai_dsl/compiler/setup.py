@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import Label, constant, entity_register, state_names
+from socialai_dsl.compiler.assembler import Label, entity_register, state_names
 from socialai_dsl.compiler.cells import (
     EVERYWHERE,
     conjuncts,
@@ -17,7 +17,7 @@ from socialai_dsl.compiler.folding import ChangeAnalysis, When, fold, mentions
 from socialai_dsl.compiler.hands import into_hands
 from socialai_dsl.compiler.step_order import first_entry
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.program import Counting, Field, Op, Register, Side
+from socialai_dsl.program import Counting, Field, Op, Register, Side, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (

@@ -51,6 +51,7 @@ from socialai_dsl.semantics.free_cells import interior_cells
 from socialai_dsl.semantics.plans import CheckedScenario, Entity, LookPlan, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
+from socialai_dsl.widths import MOST_WORDS, WHOLE_REGISTER
 
 
 def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
@@ -134,6 +135,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
     }
     words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
     # Boards are sets of bits, so a word may use the sign bit.
+    assert words.min() >= -(1 << 31) and words.max() < 1 << 32, "internal: a number that no word holds"
     return Program(
         words=words.astype(np.uint64).astype(np.uint32).view(np.int32),
         name=checked.name,
@@ -441,6 +443,8 @@ class _Code:
             if loop is not None:
                 raise InvalidProgramError(f"at {pc}: HALT inside a loop")
             return
+        if op == Op.REWARD and (entry != Header.RULES_PC or loop is not None):
+            raise InvalidProgramError(f"at {pc}: REWARD where code may run more than once a step")
         before = known.copy()
         writable = self.writable.get(entry, self.written_by_default)
         problem = problem_of((op, a, b, c), self.program, known, writable, self.is_agents)
@@ -564,6 +568,12 @@ def _registers(program: Program) -> None:
     _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
     named = [name.register for name in program.registers]
     _require(len(set(named)) == len(named), "a register has two names")
+    for name in program.registers:
+        fits = WHOLE_REGISTER[0] <= name.low <= name.high <= WHOLE_REGISTER[1]
+        _require(
+            fits,
+            f"{name.path} holds {name.low}..{name.high}, a register {WHOLE_REGISTER[0]}..{WHOLE_REGISTER[1]}",
+        )
     for start, end, name in areas:
         _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
 
@@ -642,7 +652,11 @@ def _frames(program: Program) -> None:
 def _lines(program: Program) -> None:
     h = program.header
     tokens_end = h(Header.SITE_AT)
-    _require(len(program.lines) == h(Header.LINES) < 32767, "lines without texts")
+    _require(len(program.lines) == h(Header.LINES), "lines without texts")
+    _require(
+        len(program.vocabulary) <= MOST_WORDS,
+        f"{len(program.vocabulary)} words, a token tells {MOST_WORDS} apart",
+    )
     _require(h(Header.TOKENS) >= 8, "no room for a history")
     for number, (first, count, heard_as, noun) in enumerate(program.table(Header.LINE_AT).tolist()):
         _require(1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history")

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from socialai_dsl.compiler.assembler import Block, Label, constant
+from socialai_dsl.compiler.assembler import Block, Label
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import Op
+from socialai_dsl.program import Op, constant
 from socialai_dsl.semantics.plans import Assignment, Effect, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import SitedTerm, Term
 
 _BITS = 15
-"""Bits that stand in one operand, which a register of 16 bits can keep until a body action is done."""
+"""Bits that stand in one operand, which a register can keep until a body action is done."""
 
 
 def conditions(what: RulePlan | StepPlan) -> list[SitedTerm]:

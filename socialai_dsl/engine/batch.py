@@ -176,7 +176,7 @@ class Batch:
         """
         return partial(load(serve), self._book, int(task), self._rows)
 
-    def reset(self, pins: NDArray[np.int16] | None = None) -> None:
+    def reset(self, pins: NDArray[np.int32] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
 
         Raises:

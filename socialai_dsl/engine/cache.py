@@ -60,6 +60,7 @@ def fingerprint() -> str:
         *(package / "program").glob("*.py"),
         package / "draws.py",
         package / "vocabulary.py",
+        package / "widths.py",
     ]
     digest = hashlib.sha256()
     for source in sorted(sources):

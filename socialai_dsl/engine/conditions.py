@@ -9,9 +9,10 @@ from socialai_dsl.engine.operands import draw_at, value
 from socialai_dsl.engine.paths import find_way
 from socialai_dsl.engine.sight import is_unobstructed
 from socialai_dsl.engine.speech import is_in_inbox
-from socialai_dsl.engine.state import NO_CELL, NO_PATH, PIN_NONE, Row
+from socialai_dsl.engine.state import NO_CELL, NO_PATH, Row
 from socialai_dsl.engine.whereabouts import distance, facing, is_somewhere, x_of, y_of
 from socialai_dsl.program import EntityColumn, Op
+from socialai_dsl.widths import UNPINNED
 
 
 @inline
@@ -20,7 +21,7 @@ def holds(row: Row, op: int, a: int, b: int) -> bool:
     if op == Op.IF_HEARD:
         return is_in_inbox(row, b, a)
     if op == Op.IF_UNPINNED:
-        return row.pins[a] == PIN_NONE
+        return row.pins[a] == UNPINNED
     if op == Op.IF_CHANCE:
         return rng.holds_with_chance(draw_at(row, b), a)
     left = value(row, a)

@@ -13,19 +13,21 @@ from socialai_dsl.engine.pointers import (
     bare,
     bytes_of,
     float64_of,
-    int16_of,
     int32_of,
     int64_of,
+    registers_of,
+    tokens_of,
     uint16_of,
     uint32_of,
     uint64_of,
 )
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
-from socialai_dsl.engine.state import PIN_NONE, ZERO, Book, Key, Link, Row, Size
+from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
 from socialai_dsl.engine.step import step_row
 from socialai_dsl.engine.views import CELLS
 from socialai_dsl.program import Header, Register
+from socialai_dsl.widths import UNPINNED
 
 
 @outline
@@ -33,7 +35,7 @@ def _keep_final(book: Any, row: int) -> None:
     stay_outline()
     length = int64_of(book, Book.SIZES, ZERO)[Size.TOKENS]
     copy(uint32_of(book, Book.FINAL_IMAGE, row), uint32_of(book, Book.IMAGE, row), np.int64(CELLS))
-    copy(int16_of(book, Book.FINAL_TOKENS, row), int16_of(book, Book.TOKENS, row), length)
+    copy(tokens_of(book, Book.FINAL_TOKENS, row), tokens_of(book, Book.TOKENS, row), length)
     gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
     copy(uint16_of(book, Book.FINAL_EXTRA, row), uint16_of(book, Book.EXTRA, row), gestures)
 
@@ -88,14 +90,14 @@ def _open_episode(book: Any, layout: int, row: int) -> None:
     first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
     count = _pool_size(key)
     if count > 1:
-        pinned = int16_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
+        pinned = registers_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
         if _plays_acts(key):
-            act = ZERO if pinned == PIN_NONE else pinned
+            act = ZERO if pinned == UNPINNED else pinned
             key[Key.ACT] = np.uint64(act)
             key[Key.SPOILED] = np.uint64(0)
             key[Key.KEY] = rng.act_key(key[Key.KEY], act)
             first += act
-        elif pinned != PIN_NONE:
+        elif pinned != UNPINNED:
             first += pinned
         else:
             first += draw_member(key[Key.KEY], int64_of(book, Book.WEIGHTS, first), count)
@@ -105,7 +107,7 @@ def _open_episode(book: Any, layout: int, row: int) -> None:
 @inline
 def _report_nothing(book: Any, row: int) -> None:
     float64_of(book, Book.REWARD, ZERO)[row] = 0.0
-    int16_of(book, Book.OUTCOME, ZERO)[row] = -1
+    registers_of(book, Book.OUTCOME, ZERO)[row] = -1
     bytes_of(book, Book.TERMINATED, ZERO)[row] = 0
     bytes_of(book, Book.TRUNCATED, ZERO)[row] = 0
     bytes_of(book, Book.SUCCESS, ZERO)[row] = 0
@@ -115,7 +117,7 @@ def _report_nothing(book: Any, row: int) -> None:
 @inline
 def _report_end(book: Any, row: int, opened: Row) -> None:
     table = opened.program[opened.program[Header.SIZE] + Link.ENDING_AT]
-    int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[table + opened.registers[Register.OUTCOME]]
+    registers_of(book, Book.OUTCOME, ZERO)[row] = opened.program[table + opened.registers[Register.OUTCOME]]
     success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
     bytes_of(book, Book.SUCCESS, ZERO)[row] = np.int64(success)
     bytes_of(book, Book.ENDED, ZERO)[row] = 1
@@ -168,7 +170,7 @@ def serve(book: Any, task: int, rows: int) -> int:
             layout = int32_of(arrays, Book.LAYOUT, ZERO)[row]
         else:
             _report_nothing(arrays, row)
-            if int16_of(arrays, Book.REGISTERS, row)[Register.ENDED] == 0:
+            if registers_of(arrays, Book.REGISTERS, row)[Register.ENDED] == 0:
                 opened = open_row(arrays, ZERO, row)
                 reward = step_row(opened, opened.program[Header.SIZE], arrays, row)
                 if reward != 0.0 and _plays_acts(opened.key):

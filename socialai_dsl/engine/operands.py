@@ -11,8 +11,9 @@ from socialai_dsl.program import CONSTANT, TEMPORARY, Header, Register
 @inline
 def value(row: Row, operand: int) -> int:
     """The value of an operand."""
-    if operand >= CONSTANT // 2:
-        return operand - CONSTANT
+    # What is negative is large unsigned: a constant that states itself.
+    if np.uint64(operand) >= np.uint64(CONSTANT // 2):
+        return operand - (CONSTANT & ~(operand >> 63))
     if operand >= TEMPORARY:
         return row.scratch[operand - TEMPORARY]
     return row.registers[operand]

@@ -15,6 +15,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model, ty
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.jit import inline
+from socialai_dsl.widths import REGISTER, TOKEN
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
@@ -107,6 +108,9 @@ bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64
     _guarded(kind) if config.DISABLE_JIT else _pointers_to(kind) for kind in _KINDS
 )
 """`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
+
+registers_of = {"int16": int16_of, "int32": int32_of, "int64": int64_of}[REGISTER]
+tokens_of = {"int16": int16_of, "int32": int32_of}[TOKEN]
 
 
 @intrinsic

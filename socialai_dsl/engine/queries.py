@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.picture import image_digest
-from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_of, uint64_of
+from socialai_dsl.engine.pointers import int64_of, registers_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
@@ -118,7 +118,7 @@ def _script_row(book: Any, row: int) -> None:
     """Write the scripted action of one row. It is played, and then everything is as it was."""
     opened = open_row(book, ZERO, row)
     sizes = int64_of(book, Book.SIZES, ZERO)
-    registers = int16_of(book, Book.SPARE_REGISTERS, ZERO)
+    registers = registers_of(book, Book.SPARE_REGISTERS, ZERO)
     board = uint32_of(book, Book.SPARE_BOARDS, ZERO)
     counters = int64_of(book, Book.SPARE_COUNTERS, ZERO)
     count = opened.program[Header.COUNTERS]

@@ -11,10 +11,11 @@ from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.places import occupy
 from socialai_dsl.engine.sets import clear
 from socialai_dsl.engine.speech import clear_tokens, remember
-from socialai_dsl.engine.state import ATTEMPTS, OCCUPIED, ONE, PIN_NONE, RESETTING, ZERO, Key, Row
+from socialai_dsl.engine.state import ATTEMPTS, OCCUPIED, ONE, RESETTING, ZERO, Key, Row
 from socialai_dsl.engine.turns import settle
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Body, EntityColumn, Field, Header, Register
+from socialai_dsl.widths import UNPINNED
 
 MEMBER_SITE = np.int64(draws.site("member"))
 """Where a suite draws the program of an episode."""
@@ -106,7 +107,7 @@ def _pin(row: Row, first: int) -> None:
     end = log + row.program[Header.LOG_SIZE]
     for i in range(first, row.program[Header.REGISTERS]):
         told = log <= i < end or i == Register.LOGGED or i == Register.OLDEST or i == Register.TOKENS
-        if row.pins[i] != PIN_NONE and not told:
+        if row.pins[i] != UNPINNED and not told:
             row.registers[i] = row.pins[i]
 
 
@@ -114,11 +115,11 @@ def _pin(row: Row, first: int) -> None:
 def _pin_early(row: Row) -> None:
     """Write what draws may depend on: the room, the entities and the program's own registers."""
     for i in range(Register.WIDTH, Register.HEIGHT + 1):
-        if row.pins[i] != PIN_NONE:
+        if row.pins[i] != UNPINNED:
             row.registers[i] = row.pins[i]
     _pin(row, np.int64(FIRST_ENTITY))
     for entity in range(row.program[Header.ENTITIES]):
-        if row.pins[FIRST_ENTITY + ENTITY_FIELDS * entity + Field.X] != PIN_NONE:
+        if row.pins[FIRST_ENTITY + ENTITY_FIELDS * entity + Field.X] != UNPINNED:
             if field(row, entity, Field.X) < 0:
                 set_field(row, entity, Field.GONE, ONE)
             elif field(row, entity, Field.GONE) == 0:
@@ -129,6 +130,6 @@ def _pin_early(row: Row) -> None:
 def _pin_late(row: Row) -> None:
     """Write everything a layout gives once more, over what the draws did, and what was heard."""
     _pin(row, ZERO)
-    if row.pins[Register.LOGGED] != PIN_NONE:
+    if row.pins[Register.LOGGED] != UNPINNED:
         for i in range(row.pins[Register.LOGGED]):
             remember(row, row.pins[row.program[Header.LOG] + i])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.engine.jit import inline
-from socialai_dsl.engine.pointers import int16_of, int32_of, int64_of, uint32_of, uint64_of
+from socialai_dsl.engine.pointers import int32_of, int64_of, registers_of, tokens_of, uint32_of, uint64_of
 from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row
 from socialai_dsl.program import Header
 
@@ -17,12 +17,12 @@ def open_row(book: Any, layout: int, row: int) -> Row:
     program = int32_of(book, Book.WORDS, np.int64(key[Key.PROGRAM]))
     return Row(
         program,
-        int16_of(book, Book.REGISTERS, row),
+        registers_of(book, Book.REGISTERS, row),
         uint32_of(book, Book.BOARDS, row),
         key,
-        int16_of(book, Book.TOKENS, row),
+        tokens_of(book, Book.TOKENS, row),
         int64_of(book, Book.COUNTERS, program[program[Header.SIZE] + Link.COUNTERS]),
-        int16_of(book, Book.PINS, layout),
+        registers_of(book, Book.PINS, layout),
         int64_of(book, Book.SCRATCH, ZERO),
         uint32_of(book, Book.SETS, ZERO),
     )

@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.program import BOARDS, CELL, MAX_SIDE, TEMPORARIES, Body
-
-PIN_NONE = -32768
-"""In a row of pins: this register is not given by a layout."""
+from socialai_dsl.widths import REGISTER, TOKEN, UNPINNED
 
 RESETTING = -1
 """In `Register.ENDED` while reset code runs: nothing is drawn yet."""
@@ -148,7 +146,7 @@ class Size(IntEnum):
 class State(NamedTuple):
     """The state that persists from step to step. `tokens` and `image` are also the caller's observation."""
 
-    registers: NDArray[np.int16]  # (E, R)
+    registers: NDArray[np.int32]  # (E, R)
     boards: NDArray[
         np.uint32
     ]  # (E, H * W + 1 + 2 * H + W or more) cells as seen, the last off the canvas; solid, opaque rows; opaque columns
@@ -179,13 +177,13 @@ class Ports(NamedTuple):
     """The data that a call reads and writes besides the state."""
 
     actions: NDArray[np.int64]  # (E, 3 + slots)
-    pins: NDArray[np.int16]  # (layouts, R + 1) value of each register or PIN_NONE; last: member of the pool
+    pins: NDArray[np.int32]  # (layouts, R + 1) value of each register or UNPINNED; last: member of the pool
     layout: NDArray[np.int32]  # (E,) row of the pins that the next reset uses
     chosen: NDArray[np.bool_]  # (E,) rows that a reset is for
     reward: NDArray[np.float64]  # (E,)
     terminated: NDArray[np.bool_]  # (E,)
     truncated: NDArray[np.bool_]  # (E,)
-    outcome: NDArray[np.int16]  # (E,) of the episode that ended in this step, else -1
+    outcome: NDArray[np.int32]  # (E,) of the episode that ended in this step, else -1
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
     final_extra: NDArray[np.uint16]  # as `extra`
@@ -196,7 +194,7 @@ class Ports(NamedTuple):
     counters: NDArray[np.int64]  # (counters of all programs,)
     scratch: NDArray[np.int64]  # (TEMPORARIES,)
     sets: NDArray[np.uint32]  # (SCRATCH_BOARDS * MAX_SIDE,)
-    spare_registers: NDArray[np.int16]  # (R,) of a row that is played on for a look
+    spare_registers: NDArray[np.int32]  # (R,) of a row that is played on for a look
     spare_boards: NDArray[np.uint32]  # (board,)
     spare_counters: NDArray[np.int64]  # (counters of all programs,)
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
@@ -211,12 +209,12 @@ class Row(NamedTuple):
     """One environment: pointers to its rows of the above (`pointers.pointer`), for code that is compiled."""
 
     program: NDArray[np.int32]  # words from the program's first on
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     board: NDArray[np.uint32]
     key: NDArray[np.uint64]
     tokens: NDArray[np.int16]
     counters: NDArray[np.int64]  # from the program's first on
-    pins: NDArray[np.int16]
+    pins: NDArray[np.int32]
     scratch: NDArray[np.int64]
     sets: NDArray[np.uint32]  # line y of board b is number b * MAX_SIDE + y
 
@@ -224,10 +222,10 @@ class Row(NamedTuple):
 def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, more: int) -> State:
     """A state of zeros, with `more` channels behind the fourth; every row must be reset before it is used."""
     return State(
-        registers=np.zeros((rows, registers), np.int16),
+        registers=np.zeros((rows, registers), REGISTER),
         boards=np.zeros((rows, board), np.uint32),
         keys=np.zeros((rows, Key.WORDS), np.uint64),
-        tokens=np.zeros((rows, tokens), np.int16),
+        tokens=np.zeros((rows, tokens), TOKEN),
         image=np.zeros((rows, view * view), np.uint32),
         extra=np.zeros((rows, (view * view * more + 1) // 2), np.uint16),
     )
@@ -245,7 +243,7 @@ def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
         reward=np.zeros(rows, np.float64),
         terminated=np.zeros(rows, np.bool_),
         truncated=np.zeros(rows, np.bool_),
-        outcome=np.full(rows, -1, np.int16),
+        outcome=np.full(rows, -1, REGISTER),
         final_image=np.zeros_like(state.image),
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
@@ -254,7 +252,7 @@ def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
         counters=np.zeros(counters, np.int64),
         scratch=np.zeros(TEMPORARIES, np.int64),
         sets=np.zeros(SCRATCH_BOARDS * MAX_SIDE, np.uint32),
-        spare_registers=np.zeros(registers, np.int16),
+        spare_registers=np.zeros(registers, REGISTER),
         spare_boards=np.zeros(state.boards.shape[1], np.uint32),
         spare_counters=np.zeros(counters, np.int64),
         image_ids=np.zeros(rows, np.uint64),
@@ -267,6 +265,6 @@ def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
     )
 
 
-def no_pins(registers: int) -> NDArray[np.int16]:
+def no_pins(registers: int) -> NDArray[np.int32]:
     """One row of pins that pins nothing: row 0 of every table of pins."""
-    return np.full((1, registers + 1), PIN_NONE, np.int16)
+    return np.full((1, registers + 1), UNPINNED, REGISTER)

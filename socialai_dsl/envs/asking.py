@@ -159,7 +159,7 @@ class _Looker:
         if begins and self._remembered:
             self._note(moment, self._registers[self._remembered].copy())
 
-    def _note(self, start: Start, before: NDArray[np.int16] | None = None) -> None:
+    def _note(self, start: Start, before: NDArray[np.int32] | None = None) -> None:
         state = self._table.state
         state.keys[0] = self._table.own_keys(start.key)
         self._registers[:] = start.registers[: len(self._registers)]

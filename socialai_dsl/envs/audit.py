@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from socialai_dsl.program import Flag, FrameColumn, Header, Program, Register, room_words
 from socialai_dsl.program.instructions import Interval
-from socialai_dsl.program.program import WHOLE_REGISTER, bounds_of
+from socialai_dsl.program.program import bounds_of
+from socialai_dsl.widths import WHOLE_REGISTER
 
 
-def first_unsound(program: Program, registers: NDArray[np.int16]) -> str | None:
-    """The first problem of the registers, int16 (E, R), of environments that play a program; None without one."""
-    low, high = np.array(_ranges(program), np.int16).T
+def first_unsound(program: Program, registers: NDArray[np.int32]) -> str | None:
+    """The first problem of the registers, int32 (E, R), of environments that play a program; None without one."""
+    low, high = np.array(_ranges(program), np.int64).T
     own = registers[:, : len(low)]
     wrong = np.argwhere((own < low) | (own > high))
     if len(wrong):

@@ -25,11 +25,11 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, NOUN, TURN_WORDS
 
-Row = NDArray[np.int16]
+Row = NDArray[np.int32]
 
 
 def describe(program: Program, registers: Row) -> dict[str, Any]:
-    """Everything that decides how the episode goes on, from the registers, int16 (R,), of one environment.
+    """Everything that decides how the episode goes on, from the registers, int32 (R,), of one environment.
 
     Keys: `t`, `room`, one for each cast member and object, `one_of` (which file was drawn), `let`, `state` (registers
     of the world), `memory` (what it holds, oldest first), `last` (what the agent did in the last step), `heard` (lines

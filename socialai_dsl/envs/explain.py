@@ -64,11 +64,11 @@ class RoomState:
     """A room as it is now.
 
     Attributes:
-        program: what is played. registers: int16 (R,). board: looks of the cells, then lines of solid ones.
+        program: what is played. registers: int32 (R,). board: looks of the cells, then lines of solid ones.
     """
 
     program: Program
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     board: NDArray[Any]
 
     def obstruction(self, mover: int, goal: int, beside: bool) -> str | None:
@@ -181,8 +181,8 @@ class Explainer:
         self._table = Table([_alone(self._noting.program, suite, number)], 1)
         self._table.reset(0, None)
 
-    def explain(self, recording: Recording, reached: NDArray[np.int16] | None) -> dict[str, Any]:
-        """Explain the last step of a recording, which led to these registers, int16 (R,), if they are known.
+    def explain(self, recording: Recording, reached: NDArray[np.int32] | None) -> dict[str, Any]:
+        """Explain the last step of a recording, which led to these registers, int32 (R,), if they are known.
 
         See `ScenarioEnv.explain`.
         """
@@ -239,7 +239,7 @@ class _Notes:
 
     noting: Program
     program: Program
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     board: NDArray[Any]
 
     def number(self, note: Note) -> int:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.values import (
     ActRegisters,
     addresses_of,
@@ -24,7 +23,6 @@ from socialai_dsl.envs.values import (
 )
 from socialai_dsl.program import (
     CELL,
-    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     EntityColumn,
@@ -37,8 +35,10 @@ from socialai_dsl.program import (
     Register,
     RegisterName,
     TypeColumn,
+    constant_of,
 )
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, TURN_WORDS
+from socialai_dsl.widths import REGISTER, UNPINNED
 
 
 @lru_cache(maxsize=256)
@@ -82,8 +82,8 @@ def _put_anywhere(program: Program) -> frozenset[int]:
         elif op == Op.PICK_CELL:
             drawn = True
         elif op == Op.PUT:
-            if drawn and not free and entity >= CONSTANT // 2:
-                found.add(entity - CONSTANT)
+            if drawn and not free and (number := constant_of(entity)) is not None:
+                found.add(number)
             drawn = free = False
     return frozenset(found)
 
@@ -115,8 +115,8 @@ _KEYS = {
 _OTHER_KEYS = ("t", "room", "one_of", "let", "state", "memory", "last", "heard", "pending")
 
 
-def pins_of(program: Program, layout: Mapping[str, Any], others: Sequence[str] = ()) -> NDArray[np.int16]:
-    """Pinned registers, int16 (R,): the value of each register that the layout gives, PIN_NONE for the others.
+def pins_of(program: Program, layout: Mapping[str, Any], others: Sequence[str] = ()) -> NDArray[np.int32]:
+    """Pinned registers, int32 (R,): the value of each register that the layout gives, UNPINNED for the others.
 
     Only the shape of a layout is checked: things lie on the grid and not on each other, words and lengths are known.
 
@@ -134,7 +134,7 @@ def pins_of(program: Program, layout: Mapping[str, Any], others: Sequence[str] =
 class _Layout:
     def __init__(self, program: Program, others: Sequence[str]) -> None:
         self.program = program
-        self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
+        self.row = np.full(program.header(Header.REGISTERS), UNPINNED, REGISTER)
         self.addresses = addresses_of(program)
         self.others = (*others, *_OTHER_KEYS)
         self.names = [str(entity) for entity in program.entities]
@@ -143,7 +143,7 @@ class _Layout:
         for number, entity in enumerate(program.entities):
             self.groups.setdefault(entity.key, []).append(number)
 
-    def pins(self, layout: Mapping[str, Any]) -> NDArray[np.int16]:
+    def pins(self, layout: Mapping[str, Any]) -> NDArray[np.int32]:
         self._mapping("layout", layout)
         for key in layout:
             if key not in self.groups and key not in self.others:
@@ -265,9 +265,9 @@ class _Layout:
             raise ValueError(f"{key}: got {given!r}, but nothing can be carried in this scenario")
         thing = list(things.values())[word(key, given, list(things))]
         base = FIRST_ENTITY + ENTITY_FIELDS * thing
-        if self.row[base] not in (PIN_NONE, -1):
+        if self.row[base] not in (UNPINNED, -1):
             raise ValueError(f"{key}: got {given!r}, which is given a place of its own")
-        if self.row[base + Field.CARRIER] != PIN_NONE:
+        if self.row[base + Field.CARRIER] != UNPINNED:
             raise ValueError(f"{key}: got {given!r}, which somebody else carries")
         for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1), (Field.CARRIER, 1 + number)):
             self._set(thing, field, value)
@@ -291,7 +291,7 @@ class _Layout:
 
     def _cell(self, key: str, given: Any) -> tuple[int, int]:
         """A cell of the room."""
-        is_given = self.row[Register.WIDTH] != PIN_NONE
+        is_given = self.row[Register.WIDTH] != UNPINNED
         hint = "" if is_given else " (the smallest room; give `room` for a larger one)"
         across, down = parts_of(key, given, 2, "[x, y]")
         x = whole_number(f"{key}[0]", across, 0, self.width - 1, hint)

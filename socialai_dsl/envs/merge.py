@@ -23,6 +23,7 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, mixture, prefixed
 from socialai_dsl.vocabulary import ACTIONS, Sentences
+from socialai_dsl.widths import TOKEN
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ class CommonSpace:
         return spaces.Dict(
             {
                 "image": spaces.Box(np.zeros_like(high), high, dtype=np.uint8),
-                "tokens": spaces.Box(0, len(self.vocabulary) - 1, (self.length,), np.int16),
+                "tokens": spaces.Box(0, len(self.vocabulary) - 1, (self.length,), np.dtype(TOKEN).type),
             }
         )
 

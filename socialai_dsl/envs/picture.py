@@ -134,7 +134,7 @@ def looks_of_npcs(table: Table, row: int) -> dict[EntityName, Code]:
     }
 
 
-def _fields(table: Table, row: int) -> NDArray[np.int16]:
+def _fields(table: Table, row: int) -> NDArray[np.int32]:
     """The registers of the entities in a row, (entities, ENTITY_FIELDS)."""
     count = len(table.program(row).entities)
     return table.state.registers[row, FIRST_ENTITY:][: ENTITY_FIELDS * count].reshape(-1, ENTITY_FIELDS)
@@ -207,7 +207,7 @@ def _marks(
     return {place: marks for place, marks in found.items() if marks}
 
 
-def _look(program: Program, number: int, entity: NDArray[np.int16]) -> Code:
+def _look(program: Program, number: int, entity: NDArray[np.int32]) -> Code:
     """How an object looks in its status."""
     first = program.table(Header.ENTITY_AT)[number, EntityColumn.TYPE]
     look = program.table(Header.TYPE_AT)[first + entity[Field.STATUS]]

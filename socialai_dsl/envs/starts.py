@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable, ProgramSuite
+from socialai_dsl.widths import REGISTER, UNPINNED
 
 _STEP = re.compile(r"[^.\[\]]+")
 
@@ -24,23 +24,23 @@ class Starts:
 
     Attributes:
         rows: row of `pins` for each program, int32 (programs,); 0 pins nothing.
-        pins: int16 (1 + programs with a layout, R + 1), as the engine takes them.
+        pins: int32 (1 + programs with a layout, R + 1), as the engine takes them.
     """
 
     def __init__(self, playables: Sequence[Playable], programs: Sequence[Program], registers: int) -> None:
         """Look the layouts of all suites up. Raises ValueError for one that does not fit its program."""
         layouts = [layout for playable in playables for layout in _layouts(playable)]
         self.rows = np.zeros(len(programs), np.int32)
-        table = [np.full(registers + 1, PIN_NONE, np.int16)]
+        table = [np.full(registers + 1, UNPINNED, REGISTER)]
         for number, (program, layout) in enumerate(zip(programs, layouts, strict=True)):
             if layout is None:
                 continue
             pinned = pins_of(program, layout)
-            row = np.full(registers + 1, PIN_NONE, np.int16)
+            row = np.full(registers + 1, UNPINNED, REGISTER)
             row[: len(pinned)] = pinned
             self.rows[number] = len(table)
             table.append(row)
-        self.pins: NDArray[np.int16] = np.stack(table)
+        self.pins: NDArray[np.int32] = np.stack(table)
 
     def __bool__(self) -> bool:
         """Whether any program has a layout."""

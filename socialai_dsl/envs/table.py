@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from socialai_dsl.draws import GOLDEN, MASK, MAX_SEED, TEST_DOMAIN, below, draw, episode_key, mix, site
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import BAD_ACTION, Task
-from socialai_dsl.engine.state import PIN_NONE, Key
+from socialai_dsl.engine.state import Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.copying import Copied
@@ -25,6 +25,7 @@ from socialai_dsl.envs.starts import Starts
 from socialai_dsl.envs.values import whole_number, word
 from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
+from socialai_dsl.widths import REGISTER, UNPINNED
 
 Image = NDArray[np.uint8]
 
@@ -127,9 +128,9 @@ def too_early(call: str) -> ValueError:
 
 
 class Start(NamedTuple):
-    """A moment of an environment: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
+    """A moment of an environment: registers, int32 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
 
-    registers: NDArray[np.int16]
+    registers: NDArray[np.int32]
     board: NDArray[np.uint32]
     key: NDArray[np.uint64]
 
@@ -271,7 +272,7 @@ class Table(Copied):
 
     def _pins(
         self, layout: Any, keys: NDArray[np.uint64], chosen: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.int16] | None, NDArray[np.int32]]:
+    ) -> tuple[NDArray[np.int32] | None, NDArray[np.int32]]:
         """The table of pins (row 0 pins nothing) and which of its rows each environment uses."""
         rows = np.zeros(self.rows, np.int32)
         if layout is None:
@@ -282,7 +283,7 @@ class Table(Copied):
                 f"options['layout']: got {layout!r}; expected a mapping, or a list of {self.rows}"
             )
         width = self.state.registers.shape[1] + 1
-        pins = [np.full(width, PIN_NONE, np.int16)]
+        pins = [np.full(width, UNPINNED, REGISTER)]
         known: dict[tuple[int, int, int], int] = {}
         for i in np.flatnonzero(chosen).tolist():
             if layouts[i] is None:
@@ -292,7 +293,7 @@ class Table(Copied):
             key = id(layouts[i]), pool, place
             if key not in known:
                 known[key] = len(pins)
-                row = np.full(width, PIN_NONE, np.int16)
+                row = np.full(width, UNPINNED, REGISTER)
                 program = self.programs[self.merged.pools[pool][place]]
                 given = pins_of(program, layouts[i], self._other_keys(pool))
                 row[: len(given)] = given

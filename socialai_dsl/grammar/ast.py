@@ -18,6 +18,8 @@ from lark import Lark, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, VisitError
 from lark.visitors import Transformer_NonRecursive
 
+from socialai_dsl.widths import LARGEST_NUMBER
+
 Kind = TypeVar("Kind")
 
 
@@ -405,6 +407,9 @@ def _parser() -> Lark:
     return Lark(grammar, parser="lalr", lexer="contextual", propagate_positions=True)
 
 
+_DIGITS = 20
+
+
 @v_args(meta=True)
 class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
     """Builds our nodes from lark's tree, bottom-up, so no recursion depends on the input."""
@@ -416,8 +421,10 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
         return node
 
     def number(self, meta: Any, items: list[Any]) -> Any:
-        if len(items[0]) > 9:
-            raise ParseProblem("S004", f"the number {items[0][:12]}... is too large", meta.start_pos)
+        # Of thousands of digits Python makes no number.
+        if len(items[0]) > _DIGITS or int(items[0]) > LARGEST_NUMBER:
+            message = f"the number {items[0][:12]} is too large; numbers go up to {LARGEST_NUMBER:,}"
+            raise ParseProblem("S004", message, meta.start_pos)
         return self._made(Number(int(items[0]), at=meta.start_pos))
 
     def text(self, meta: Any, items: list[Any]) -> Any:

@@ -4,7 +4,7 @@ A `Program` is one int32 vector (`words`) that the engine reads, plus names and 
 header (`Header`), which holds sizes, flags and the offsets of the tables below. All offsets count from the first word
 of the program, so programs can be laid one behind the other in a batch.
 
-**State.** An environment is a row of int16 registers, a row of uint32 boards, and a row of uint64 keys (engine/state.py
+**State.** An environment is a row of int32 registers, a row of uint32 boards, and a row of uint64 keys (engine/state.py
 gives shapes). Registers 0 to 31 are the same in every program (`Register`). From `FIRST_ENTITY` on follow the entities,
 `ENTITY_FIELDS` registers each (`Field`): the agent is entity 0, NPCs follow in cast order, then objects in file order,
 members of a group next to each other. Then come the program's own registers (drawn names, `let`, frame states, clocks,
@@ -16,10 +16,11 @@ one loop: it runs the instructions up to its `END_EACH` once for each cell of a 
 Code starts at a `pc`, counted in instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so an
 entry of 0 means "nothing to do".
 
-**Operands.** `v(x)`, the value of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
-x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run. An
-entity is named by its number; where a place will do, also by a cell: `CELL + 32 * y + x`, which is always present,
-never moves and faces nowhere. Boards are sets of cells, numbered 0 to BOARDS - 1; they carry nothing from run to run.
+**Operands.** `v(x)`, the value of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2, x itself if it is
+negative (`constant`); a temporary if x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and
+carry nothing from run to run. An entity is named by its number; where a place will do, also by a cell:
+`CELL + 32 * y + x`, which is always present, never moves and faces nowhere. Boards are sets of cells, numbered 0 to
+BOARDS - 1; they carry nothing from run to run.
 
 **Utterance classes.** The compiler groups all pairs (template, noun) that no rule of the program tells apart into one
 class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits
@@ -59,6 +60,9 @@ from socialai_dsl.program.format import (
     Register,
     Side,
     TypeColumn,
+    constant,
+    constant_of,
+    is_temporary,
     pack_cell,
     pack_held,
     place_of,
@@ -112,6 +116,9 @@ __all__ = [
     "RegisterName",
     "Side",
     "TypeColumn",
+    "constant",
+    "constant_of",
+    "is_temporary",
     "pack_cell",
     "pack_held",
     "place_of",

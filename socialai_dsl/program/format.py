@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from socialai_dsl.widths import LARGEST_NUMBER
+
 VERSION = 2
 TEMPORARY = 8192
 TEMPORARIES = 1 << 15
 """Room for the values of the largest rule that checking lets pass; only those in use are ever touched."""
 CONSTANT = 1 << 20
+"""Added to a constant to make an operand of it, unless that lies so far below zero that it is its own operand."""
+_LEAST_ADDED_TO = -CONSTANT // 2
 SECRET = 1 << 16
 """Added to the class of a line that the agent never hears: it is said to others alone."""
 BOARDS = 256
@@ -24,11 +28,29 @@ MAX_SIDE = 30
 """Widest and highest canvas: a row of a board is one 32-bit word."""
 
 
+def constant(value: int) -> int:
+    """The operand word of a known value."""
+    assert abs(value) <= LARGEST_NUMBER, f"internal: the constant {value} does not fit into an operand"
+    return value + CONSTANT if value >= _LEAST_ADDED_TO else value
+
+
+def constant_of(operand: int) -> int | None:
+    """The value that an operand word states, None if it names a register or temporary."""
+    if operand < 0:
+        return operand
+    return operand - CONSTANT if operand >= CONSTANT // 2 else None
+
+
+def is_temporary(operand: int, first: int = 0) -> bool:
+    """Whether an operand word names a temporary, the first or a later one."""
+    return TEMPORARY + first <= operand < TEMPORARY + TEMPORARIES
+
+
 class Header(IntEnum):
     """Words of the header. Offsets (`*_AT`) count words from the program's start; `*_PC` are code addresses."""
 
     SIZE = 0  # words in the whole program
-    REGISTERS = 1  # int16 registers of a row
+    REGISTERS = 1  # registers of a row
     CANVAS_WIDTH = 2
     CANVAS_HEIGHT = 3
     ENTITIES = 4  # agent + NPCs + objects

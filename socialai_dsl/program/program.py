@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,6 @@ import numpy.typing as npt
 from socialai_dsl.program.format import (
     CELL,
     CHANNELS,
-    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     GESTURES,
@@ -29,18 +28,17 @@ from socialai_dsl.program.format import (
     LineColumn,
     Register,
     TypeColumn,
+    constant_of,
 )
 from socialai_dsl.program.instructions import TABLE, Bounds, Interval, Kind, Op
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS, NOUN, Sentences
+from socialai_dsl.widths import WHOLE_REGISTER
 
 _AS_WRITTEN = frozenset((Kind.LITERAL, Kind.SITE, Kind.BOARD, Kind.FILLED, Kind.CHANGED))
 """Operands whose word is shown as it is."""
 
 _ENTRIES = ("reset", "require", "before", "links", "settle", "rules", "tick")
-
-
-WHOLE_REGISTER: Final[Interval] = (-32768, 32767)
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,8 +391,7 @@ class _Names:
                 return "|".join(ACTIONS[word >> 4 * k & 15] for k in range(count))
         if operand.kind in _AS_WRITTEN:
             return str(word)
-        if word >= CONSTANT // 2:
-            value = word - CONSTANT
+        if (value := constant_of(word)) is not None:
             is_place = operand.kind in (Kind.ENTITY, Kind.PLACE)
             return self._place(value) if is_place else f"#{value}"
         if word >= TEMPORARY:

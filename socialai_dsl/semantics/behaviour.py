@@ -65,6 +65,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, on_hearing, with_slots
 from socialai_dsl.source import DataPath
+from socialai_dsl.widths import LARGEST_NUMBER
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
@@ -579,6 +580,8 @@ class _Planner:
                 resolver.findings.error(
                     "S106", "`after` is a number of turns, at least 0", resolver.findings.at(place)
                 )
+            elif term.value > LARGEST_NUMBER:
+                resolver.findings.too_large("`after`", term.value, resolver.findings.at(place))
             return max(0, term.value), when
         clock = Read(Type("int", 0, resolver.symbols.scenario.horizon), f"{self.played.member}.clock")
         late = Compare("<=", term, clock)

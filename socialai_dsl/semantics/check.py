@@ -68,6 +68,7 @@ from socialai_dsl.semantics.terms import (
 from socialai_dsl.semantics.texts import words_in_order
 from socialai_dsl.source import DataPath, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, composed, words
+from socialai_dsl.widths import LARGEST_NUMBER
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
@@ -224,23 +225,30 @@ def _values(drawn: Drawn) -> tuple[int, ...]:
 # -- ranges of registers that are set --------------------------------------------------------------------------
 
 
-_WIDEN_AFTER = 12
-_MOST_ROUNDS = 20
+_PATIENCE = 12
+"""Rounds of growth before the registers that still grow are taken to grow throughout an episode."""
+_MOST_NARROWINGS = 7
 
 
 class Ranges:
     """Finds, over repeated resolutions, ranges that hold whatever is set.
 
+    A register that follows from others is known when they are, which takes a round for each register on the way. One
+    that follows from itself, such as `n: n + 1`, is given what it can gain in a whole episode.
+
     Attributes:
         now: register -> the range to resolve with.
-        unbounded: registers whose growth depends on their size, so that no range can be given.
+        too_far: register -> the farthest number it may come to, of those that no register can hold.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.now: dict[str, Type] = {}
-        self.unbounded: list[str] = []
-        self._growth: dict[str, int] = {}
+        self.too_far: dict[str, int] = {}
         self._rounds = 0
+        self._grew: set[str] = set()
+        self._growing: set[str] = set()
+        self._gains: dict[str, int] = {}
+        self._narrowings = 0
         self._wide: dict[str, Type] | None = None
         followed = Counter(member.frame for member in scenario.members().values())
         setters = sum(bool(rule.set) for rule in scenario.rules)
@@ -249,28 +257,43 @@ class Ranges:
             setters += own * max(1, followed[str(path[-1])])
         self._steps = scenario.horizon * setters
 
-    def settled(self, needed: Mapping[str, Type]) -> bool:
-        """Take note of the ranges that a resolution asked for; whether it had them already."""
+    def settled(self, needed: Mapping[str, Type], read: Mapping[str, set[str]]) -> bool:
+        """Take note of the ranges that a resolution asked for; whether it had them already.
+
+        `read`: register -> the registers that the values it is set to follow from.
+        """
         self._rounds += 1
-        fits = all(_within(type_, self.now.get(path)) for path, type_ in needed.items())
-        if self._wide is not None and (not fits or self.now is self._wide):
+        excess = {p: _excess(t, self.now.get(p)) for p, t in needed.items() if p not in self.too_far}
+        if self._wide is not None and (any(excess.values()) or self.now is self._wide):
             return self._back()
-        if fits:
-            return self._rounds <= _WIDEN_AFTER + 1 or not self._narrow(needed)
-        if self._rounds <= _WIDEN_AFTER:
-            self._growth = {path: _excess(type_, self.now.get(path)) for path, type_ in needed.items()}
-            self.now = dict(needed)
-            return False
-        if self._rounds == _WIDEN_AFTER + 1:
-            self.now = {path: self._widened(type_, self.now[path]) for path, type_ in needed.items()}
-            return False
-        self.unbounded = [p for p, t in needed.items() if _excess(t, self.now[p]) > self._growth[p]]
-        return True
+        growing = {path for path, more in excess.items() if more > self._gains.get(path, 0)}
+        if not growing:
+            return not self._gains or any(excess.values()) or not self._narrow(needed)
+        spreads = bool(growing - self._grew) or growing < self._growing
+        widens = self._rounds > _PATIENCE and (bool(self._gains) or not spreads)
+        self._grew |= growing
+        self._growing = growing
+        following = {path: self.now[path] if path in self._gains else type_ for path, type_ in needed.items()}
+        for path in growing if widens else ():
+            if path in _sources(path, read):
+                self._gains[path] = excess[path]
+                following[path] = self._widened(needed[path], self.now[path])
+        self.now = {path: self._kept(path, type_) for path, type_ in following.items()}
+        return False
+
+    def _kept(self, path: str, type_: Type) -> Type:
+        """A range as far as a register can hold it; what lies beyond is noted."""
+        low, high = max(type_.low, -LARGEST_NUMBER), min(type_.high, LARGEST_NUMBER)
+        if (low, high) == (type_.low, type_.high):
+            return type_
+        self.too_far[path] = max(type_.low, type_.high, key=abs)
+        return replace(type_, low=min(low, LARGEST_NUMBER), high=max(high, -LARGEST_NUMBER))
 
     def _narrow(self, needed: Mapping[str, Type]) -> bool:
         """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
-        if self._rounds > _MOST_ROUNDS or needed == self.now:
+        if self._narrowings == _MOST_NARROWINGS or needed == self.now:
             return False
+        self._narrowings += 1
         self._wide, self.now = self.now, dict(needed)
         return True
 
@@ -288,14 +311,21 @@ class Ranges:
         return replace(needed, low=low, high=high)
 
 
-def _within(type_: Type, range_: Type | None) -> bool:
-    return range_ is not None and range_.low <= type_.low and type_.high <= range_.high
+def _sources(path: str, read: Mapping[str, set[str]]) -> set[str]:
+    """All registers that a register follows from, itself among them if it follows from itself."""
+    found: set[str] = set()
+    waiting = [path]
+    while waiting:
+        new = read.get(waiting.pop(), set()) - found
+        found |= new
+        waiting += new
+    return found
 
 
 def _excess(type_: Type, range_: Type | None) -> int:
-    """By how much a type goes beyond a range."""
+    """By how much a type goes beyond a range; beyond none by something."""
     if range_ is None:
-        return 0
+        return 1
     return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
 
 
@@ -379,7 +409,7 @@ def _of_npcs(spoken: Spoken) -> Iterator[Line]:
 # -- the whole scenario --------------------------------------------------------------------------------------
 
 
-_MAX_ROUNDS = 24
+_MAX_ROUNDS = 1000
 
 MAX_BODIES: Final = 128
 """How many objects and members of the cast a scenario may have."""
@@ -428,9 +458,8 @@ def check_meaning(
         words = registers.words
         if registers.learned:
             continue
-        if found.has_errors or (ranges.settled(registers.ranges) and settled):
-            for path in ranges.unbounded:
-                run.report_growth(path)
+        if found.has_errors or (ranges.settled(registers.ranges, registers.sources) and settled):
+            run.report_too_far(ranges.too_far)
             if checked is not None:
                 check_absences(checked, findings, check_placements(checked, findings))
             if checked is not None and not found.has_errors:
@@ -737,10 +766,22 @@ class _Run:
             return 900
         return round(float(found.group(1)) * 1000)
 
-    def report_growth(self, path: str) -> None:
-        """A register whose range has no end."""
-        source = self.resolver.registers.source(path)
-        name = source[-1]
-        span = self._findings.places.key_span(source)
-        hint = f"bound it: `set: {{{name}: min({name} * 2, 100)}}`"
-        self._findings.error("S106", f"`{name}` can grow without end", span, hint=hint)
+    def report_too_far(self, grown: Mapping[str, int]) -> None:
+        """Registers that may come to numbers that none can hold: as they are set (`grown`), or to begin with."""
+        registers, places = self.resolver.registers, self._findings.places
+        found, spans = dict(grown), dict[str, Span]()
+        for drawn in (*registers.drawn(), *registers.remembered):
+            far = max(drawn.type.low, drawn.type.high, key=abs)
+            if drawn.type.kind == "int" and abs(far) > LARGEST_NUMBER:
+                found.setdefault(drawn.path.partition("(")[0], far)
+                spans[drawn.path] = drawn.value.span
+        for path, far in found.items():
+            declaration = registers.declaration(path)
+            if declaration is None:
+                self._findings.too_large("this", far, spans[path], hint="bound it: `min(..., 1000)`")
+                continue
+            name, hint = declaration.source[-1], "bound it: `min(..., 1000)`"
+            if path in grown:
+                hint = f"bound what it is set to: `set: {{{name}: min({name} * 2, 100)}}`"
+            span = places.key_span(declaration.source)
+            self._findings.too_large(f"`{declaration.label}`", far, span, hint=hint)

@@ -15,12 +15,12 @@ from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
+from socialai_dsl.widths import LARGEST_NUMBER
 
 _MOST: Final = 64
 """The most possible answers that need not be written out."""
 _MOST_VALUES: Final = 1_000
 """The most values of the texts of all probes."""
-_LARGEST: Final = 32767
 _KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
 
 Text = tuple[str | Drawn, ...]
@@ -164,9 +164,9 @@ class _Entry:
     def _value(self, part: str, sited: SitedTerm) -> Drawn:
         """A value with a register of its own."""
         type_ = sited.term.type
-        if max(abs(type_.low), abs(type_.high)) > _LARGEST:
-            message = f"this can be anything from {type_.low} to {type_.high}, and the limit is {_LARGEST}"
-            raise self._findings.fail("S106", message, sited.span, hint="bound it: min(..., 100)")
+        far = max(type_.low, type_.high, key=abs)
+        if abs(far) > LARGEST_NUMBER:
+            raise self._findings.too_large("this", far, sited.span, hint="bound it: `min(..., 100)`")
         self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
         return self._values[-1]
 

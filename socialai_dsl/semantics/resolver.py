@@ -204,6 +204,7 @@ class Registers:
             start with nothing.
         learned: whether it was found only now what some register holds that starts with nothing.
         ranges: for registers that are set, the range they were found to need.
+        sources: for these, the registers that the values they are set to follow from.
         remembered: what is computed at the start of every step, for `prev`.
     """
 
@@ -220,6 +221,7 @@ class Registers:
         self.learned = False
         self._given_ranges = dict(ranges)
         self.ranges: dict[str, Type] = {}
+        self.sources: dict[str, set[str]] = {}
 
     def __len__(self) -> int:
         """How many registers are declared or hold a known value."""
@@ -247,6 +249,7 @@ class Registers:
         if known is None:
             known = Drawn(f"{NOTED}{len(self.remembered)}", value.term.type, value)
             self.remembered.append(known)
+            self.sources[known.path] = _registers_in(value.term)
         return Read(known.type, known.path)
 
     @contextmanager
@@ -266,9 +269,9 @@ class Registers:
     def __contains__(self, path: str) -> bool:
         return path in self._declared or path in self._terms
 
-    def source(self, path: str) -> DataPath:
-        """Where a register is declared."""
-        return self._declared[path].source
+    def declaration(self, path: str) -> Declaration | None:
+        """The declaration of a register, None of one that is none of the author's own."""
+        return self._declared.get(path)
 
     def drawn(self) -> list[Drawn]:
         """All registers that are not constants, in the order declared; unused ones are resolved now."""
@@ -366,9 +369,10 @@ class Registers:
             return None
         return self.read(path).type
 
-    def widen(self, path: str, type_: Type) -> None:
-        """Make room in a register for the values it is set to; one with a range of its own keeps to it."""
-        declaration = self._declared[path]
+    def widen(self, path: str, value: Term) -> None:
+        """Make room in a register for a value it is set to; one with a range of its own keeps to it."""
+        declaration, type_ = self._declared[path], value.type
+        self.sources.setdefault(path, set()).update(_registers_in(value))
         if declaration.starts_with_nothing and declaration.range is None and path not in self.words:
             self.words[path] = type_
             self.learned = True
@@ -480,6 +484,11 @@ class Registers:
         )
         findings = self._resolver.findings
         return findings.fail("S208", needs, findings.places.key_span(circle[0].source))
+
+
+def _registers_in(term: Term) -> set[str]:
+    """The registers that a term reads; those of a group are one."""
+    return {part.path.partition("(")[0] for part in walk(term) if isinstance(part, Read)}
 
 
 def _union(a: Type, b: Type) -> Type:

@@ -24,6 +24,7 @@ from socialai_dsl.semantics.scope import (
 from socialai_dsl.semantics.signatures import WORDS
 from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term, Type, entity, numbers_of
 from socialai_dsl.source import DataPath
+from socialai_dsl.widths import LARGEST_NUMBER
 
 _KEYS = ("entity", "color", "noun", "int")
 """Kinds of values of which each may have a register."""
@@ -35,6 +36,9 @@ def keys(resolver: Resolver, path: DataPath, raw: Expression) -> tuple[Const, ..
     node = resolver.findings.expression(path, raw)
     members = groups.group(resolver, node, None, scope)
     if members.type.kind in _KEYS and members.bounds is None:
+        far = max((item.value for item in members.items), key=abs, default=0)
+        if members.type.kind == "int" and abs(far) > LARGEST_NUMBER:
+            raise resolver.findings.too_large("a key", far, resolver.findings.node(path, node))
         return tuple(dict.fromkeys(members.items))
     message = f"there can be no register for each of `{quoted(node)}`"
     hint = "a group of objects or of the cast, `cast`, `objects`, `colors`, `nouns`, or a range 1..3"

@@ -37,6 +37,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.source import Data, DataPath, Node, Span
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
+from socialai_dsl.widths import LARGEST_NUMBER
 
 Scalar = int | bool | float | str
 
@@ -55,6 +56,10 @@ _BREAK: Final = re.compile(r"[\t\n\r]")
 
 class FailedError(Exception):
     """A value that means nothing; the reason has been reported."""
+
+
+_EXACTLY: Final = 10**12
+"""Numbers below are written with all their digits."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +113,13 @@ class Findings:
     def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
         """Report a warning."""
         self.bag.warning(code, message, span, **more)
+
+    def too_large(self, what: str, far: int, span: Span, **more: str | None) -> FailedError:
+        """Report a number that nothing can keep; raising the result gives up the value it is in."""
+        number = f"{far:,}" if abs(far) < _EXACTLY else f"{far:.1e}"
+        limit = LARGEST_NUMBER if far > 0 else -LARGEST_NUMBER
+        message = f"{what} can be {number}, and numbers go {'up' if far > 0 else 'down'} to {limit:,}"
+        return self.fail("S106", message, span, **more)
 
     def no_such(self, word: str, message: str, span: Span, **more: str | None) -> FailedError:
         """Report a name that means nothing there."""

@@ -688,7 +688,7 @@ def value_for(resolver: Resolver, register: str, raw: object, scope: Scope) -> S
     if known is None and isinstance(raw, str) and _is_noun(resolver, raw.strip(), scope):
         expected = resolver.symbols.nouns
     value = resolver.sited(raw, expected, scope)  # type: ignore[arg-type]
-    registers.widen(register, value.term.type)
+    registers.widen(register, value.term)
     return value
 
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.state import PIN_NONE, Key, no_pins
+from socialai_dsl.engine.state import Key, no_pins
 from socialai_dsl.program import Body, Op, Program, Register
+from socialai_dsl.widths import REGISTER, UNPINNED
 from tests.assembly import (
     Assembly,
     constant,
@@ -130,7 +131,7 @@ def test_time_ends_the_episode_in_whatever_act() -> None:
 def test_a_layout_may_start_with_a_later_act() -> None:
     batch = suite(3)
     width = batch.state.registers.shape[1] + 1
-    pins = np.concatenate([no_pins(width - 1), np.full((1, width), PIN_NONE, np.int16)])
+    pins = np.concatenate([no_pins(width - 1), np.full((1, width), UNPINNED, REGISTER)])
     pins[1, -1] = 2
     batch.ports.layout[:] = 1
     batch.reset(pins)

@@ -10,8 +10,9 @@ import pytest
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import RoomError, Task
-from socialai_dsl.engine.state import ATTEMPTS, PIN_NONE, Key
+from socialai_dsl.engine.state import ATTEMPTS, Key
 from socialai_dsl.program import Body, Field, Op, Program, Register
+from socialai_dsl.widths import REGISTER, UNPINNED
 from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, part_of, temporary
 
 OWN = Assembly(at=(None,)).own
@@ -164,7 +165,7 @@ def test_pins_hold_in_every_attempt() -> None:
     program = drawn(1000, 750)
     batch = batch_of(program)
     for value, accepted in ((800, True), (10, False)):
-        pins = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+        pins = np.full((2, batch.state.registers.shape[1] + 1), UNPINNED, REGISTER)
         pins[1, OWN] = value
         batch.ports.layout[:] = 1
         if accepted:
@@ -195,7 +196,7 @@ def test_a_pool_keeps_its_member() -> None:
 def test_a_moment_of_an_episode_is_not_asked_for_its_room() -> None:
     """A layout with a time later than 0 is taken as it is: its room was accepted when the episode began."""
     batch = batch_of(drawn(1000, 750))
-    pins = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+    pins = np.full((2, batch.state.registers.shape[1] + 1), UNPINNED, REGISTER)
     pins[1, OWN] = 10
     batch.ports.layout[:] = 1
     pins[1, Register.T] = 3
@@ -211,7 +212,7 @@ def test_prepared_calls_outlive_layouts_also_those_that_are_refused() -> None:
     batch = batch_of(drawn(10, 3), 1)
     step = batch.stepper(Task.STEP_ONLY)
     for number, fits in ((9, True), (1, False), (8, True), (0, False)):
-        pins = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+        pins = np.full((2, batch.state.registers.shape[1] + 1), UNPINNED, REGISTER)
         pins[1, OWN] = number
         batch.ports.layout[:] = 1
         batch.ports.chosen[:] = True

@@ -8,8 +8,9 @@ import pytest
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.state import PIN_NONE, Key
+from socialai_dsl.engine.state import Key
 from socialai_dsl.program import Body, Field, Header, Op, Program, Register
+from socialai_dsl.widths import REGISTER, UNPINNED
 from tests.assembly import (
     LOCKED,
     Assembly,
@@ -26,7 +27,7 @@ SILENT = (7, 0, 0, 0)
 def pinned(program: Program, pins: dict[int, int], batch: Batch | None = None) -> Batch:
     """A batch of one, reset with pinned registers."""
     batch = batch or batch_of(program)
-    table = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+    table = np.full((2, batch.state.registers.shape[1] + 1), UNPINNED, REGISTER)
     for register, value in pins.items():
         table[1, register] = value
     batch.ports.layout[:] = 1

@@ -8,6 +8,7 @@ import pytest
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.program import Body, Field, Flag, Op, Register
+from socialai_dsl.widths import REGISTER, UNPINNED
 from tests.assembly import (
     CLOSED,
     LOCKED,
@@ -196,7 +197,7 @@ def test_a_lock_that_a_link_undoes_comes_and_goes_as_if_settled_without_end() ->
 
 def test_pins_are_settled() -> None:
     batch = batch_of(Assembly(**LINKED).program())  # type: ignore[arg-type]
-    pins = np.full((2, batch.state.registers.shape[1] + 1), -32768, np.int16)
+    pins = np.full((2, batch.state.registers.shape[1] + 1), UNPINNED, REGISTER)
     pins[1, entity_register(1, Field.STATUS)] = OPEN
     batch.ports.layout[:] = 1
     batch.reset(pins)

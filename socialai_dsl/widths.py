@@ -1,0 +1,29 @@
+"""How wide each stored thing is. The checks refuse what an author writes that needs more, the verifier any program.
+
+Nothing else in the project spells such a bound.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+REGISTER: Final = "int32"
+"""The type of a register."""
+
+UNPINNED: Final = -(1 << (int(REGISTER.removeprefix("int")) - 1))
+"""In a row of pins: no layout gives this register. No register ever holds it."""
+
+WHOLE_REGISTER: Final = (UNPINNED + 1, -UNPINNED - 1)
+"""What a register can hold."""
+
+LARGEST_NUMBER: Final = 1_000_000_000
+"""Greatest magnitude of a number that is kept from one step to the next, paid, or a constant of an instruction.
+
+A register holds more than twice that: there is room for a value that stands for nothing, and a sum of two fits.
+"""
+
+TOKEN: Final = "int16"
+"""The type of the number of a word in the observation; 0 pads and 1 is unknown."""
+
+MOST_WORDS: Final = 1 << (int(TOKEN.removeprefix("int")) - 1)
+"""How many words a vocabulary can have, the two above among them."""
