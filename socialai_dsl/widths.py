@@ -23,7 +23,10 @@ A register holds more than twice that: there is room for a value that stands for
 """
 
 TOKEN: Final = "int16"
-"""The type of the number of a word in the observation; 0 pads and 1 is unknown."""
+"""The type of the number of a word in the observation."""
+
+UNSPOKEN: Final = ("<pad>", "<unk>")
+"""The first words of every vocabulary: padding, and a word that is unknown."""
 
 MOST_WORDS: Final = 1 << (int(TOKEN.removeprefix("int")) - 1)
-"""How many words a vocabulary can have, the two above among them."""
+"""How many words a vocabulary can have, those two among them."""

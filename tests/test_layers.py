@@ -262,29 +262,3 @@ def test_checking_a_file_loads_nothing_heavy(statement: str) -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
     )
     assert result.stdout.strip() == "[]"
-
-
-def test_a_scenario_goes_through_forty_files_at_most() -> None:
-    """From its file to its program: those of which a function is called, so that a reader can follow the way."""
-    script = """
-import sys
-from pathlib import Path
-from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.frontend import load
-root, called = str(Path("socialai_dsl").resolve()), set()
-def note(frame, event, _):
-    if event == "call" and frame.f_code.co_filename.startswith(root):
-        called.add(frame.f_code.co_filename)
-sys.setprofile(note)
-compile_loaded(load("talkitout"))
-sys.setprofile(None)
-print(*sorted(called), sep="\\n")
-"""
-    result = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
-    )
-    files = result.stdout.split()
-    assert files, "nothing was called"
-    assert len(files) <= 40, result.stdout
-    lengths = {file: len(Path(file).read_text(encoding="utf-8").splitlines()) for file in files}
-    assert max(lengths.values()) <= 770, max(lengths, key=lambda file: lengths[file])

@@ -176,6 +176,7 @@ SPOKEN_OF = (
         "joint_attention(",
     ),
     *(" if ", " else ", "repeat:", "while:"),
+    *("vault(code)", "hoard:", "32768", "1000000000"),
 )
 """What authors can write, and what the random scenarios of the ordinary suite are to contain."""
 

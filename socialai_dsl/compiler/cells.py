@@ -573,6 +573,7 @@ _MASK_BITS = 19
 """How many numbers a set in one operand can tell apart."""
 _WORD_BITS = 63
 _MOST_NUMBERS = 1 << 12
+_MOST_KEYS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -666,6 +667,8 @@ def _switch(term: Select) -> _Switch | None:
     if first is None:
         return None
     key = first[0]
+    if key.type.size > _MOST_KEYS:
+        return None
     left = set(key.type.values)
     cases: dict[Term, set[int]] = {}
     for ask, value in zip(asked, term.values, strict=True):

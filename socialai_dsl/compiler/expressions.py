@@ -39,6 +39,7 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
 from socialai_dsl.vocabulary import normal, words
+from socialai_dsl.widths import UNSPOKEN
 
 _TESTS = {
     "at": Op.IF_SAME_CELL,
@@ -432,7 +433,7 @@ class Lines:
     def __post_init__(self) -> None:
         self._known: dict[tuple[int, tuple[str | Term, ...], Term | None], int] = {}
         self.grammar = self.checked.sentences.by_number()
-        self.vocabulary = ("<pad>", "<unk>", *self.checked.words_in_order)
+        self.vocabulary = (*UNSPOKEN, *self.checked.words_in_order)
         self._ids = {word: number for number, word in enumerate(self.vocabulary)}
         if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
             self._add_agent()

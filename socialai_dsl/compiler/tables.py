@@ -135,7 +135,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
     }
     words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
     # Boards are sets of bits, so a word may use the sign bit.
-    assert words.min() >= -(1 << 31) and words.max() < 1 << 32, "internal: a number that no word holds"
+    assert -(1 << 31) <= words.min() <= words.max() < 1 << 32, "internal: a number that no word holds"
     return Program(
         words=words.astype(np.uint64).astype(np.uint32).view(np.int32),
         name=checked.name,
@@ -570,10 +570,7 @@ def _registers(program: Program) -> None:
     _require(len(set(named)) == len(named), "a register has two names")
     for name in program.registers:
         fits = WHOLE_REGISTER[0] <= name.low <= name.high <= WHOLE_REGISTER[1]
-        _require(
-            fits,
-            f"{name.path} holds {name.low}..{name.high}, a register {WHOLE_REGISTER[0]}..{WHOLE_REGISTER[1]}",
-        )
+        _require(fits, f"{name.path} holds {name.low}..{name.high}, which no register does")
     for start, end, name in areas:
         _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
 
@@ -653,10 +650,7 @@ def _lines(program: Program) -> None:
     h = program.header
     tokens_end = h(Header.SITE_AT)
     _require(len(program.lines) == h(Header.LINES), "lines without texts")
-    _require(
-        len(program.vocabulary) <= MOST_WORDS,
-        f"{len(program.vocabulary)} words, a token tells {MOST_WORDS} apart",
-    )
+    _require(len(program.vocabulary) <= MOST_WORDS, "more words than tokens tell apart")
     _require(h(Header.TOKENS) >= 8, "no room for a history")
     for number, (first, count, heard_as, noun) in enumerate(program.table(Header.LINE_AT).tolist()):
         _require(1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history")

@@ -23,7 +23,7 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, mixture, prefixed
 from socialai_dsl.vocabulary import ACTIONS, Sentences
-from socialai_dsl.widths import TOKEN
+from socialai_dsl.widths import MOST_WORDS, TOKEN
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,9 @@ class CommonSpace:
         length = max(program.header(Header.TOKENS) for program in suite.programs)
         highest = np.max([_highest_codes(program) for program in suite.programs], axis=0).tolist()
         highest += [NO_GESTURE] * (len(channels) - len(highest))
+        if len(playable.vocabulary) > MOST_WORDS:
+            got = f"{len(playable.vocabulary):,} different words"
+            raise ValueError(f"scenarios: got {got} together, expected at most {MOST_WORDS:,}")
         return cls(
             playable,
             suite.programs,

@@ -40,6 +40,7 @@ from socialai_dsl.semantics.probes import probes
 from socialai_dsl.semantics.resolve import ScenarioResolver
 from socialai_dsl.semantics.resolver import (
     INT,
+    MAX_ALL_TEXTS,
     MAX_TEXTS,
     Resolver,
     number_of_texts,
@@ -68,7 +69,7 @@ from socialai_dsl.semantics.terms import (
 from socialai_dsl.semantics.texts import words_in_order
 from socialai_dsl.source import DataPath, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, composed, words
-from socialai_dsl.widths import LARGEST_NUMBER
+from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
@@ -263,6 +264,9 @@ class Ranges:
         `read`: register -> the registers that the values it is set to follow from.
         """
         self._rounds += 1
+        for path, type_ in needed.items():
+            if abs(far := max(type_.low, type_.high, key=abs)) > LARGEST_NUMBER:
+                self.too_far.setdefault(path, far)
         excess = {p: _excess(t, self.now.get(p)) for p, t in needed.items() if p not in self.too_far}
         if self._wide is not None and (any(excess.values()) or self.now is self._wide):
             return self._back()
@@ -278,16 +282,8 @@ class Ranges:
             if path in _sources(path, read):
                 self._gains[path] = excess[path]
                 following[path] = self._widened(needed[path], self.now[path])
-        self.now = {path: self._kept(path, type_) for path, type_ in following.items()}
+        self.now = {path: _cut(type_) for path, type_ in following.items()}
         return False
-
-    def _kept(self, path: str, type_: Type) -> Type:
-        """A range as far as a register can hold it; what lies beyond is noted."""
-        low, high = max(type_.low, -LARGEST_NUMBER), min(type_.high, LARGEST_NUMBER)
-        if (low, high) == (type_.low, type_.high):
-            return type_
-        self.too_far[path] = max(type_.low, type_.high, key=abs)
-        return replace(type_, low=min(low, LARGEST_NUMBER), high=max(high, -LARGEST_NUMBER))
 
     def _narrow(self, needed: Mapping[str, Type]) -> bool:
         """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
@@ -309,6 +305,12 @@ class Ranges:
         low = needed.low - (now.low - needed.low) * self._steps if needed.low < now.low else needed.low
         high = needed.high + (needed.high - now.high) * self._steps if needed.high > now.high else needed.high
         return replace(needed, low=low, high=high)
+
+
+def _cut(type_: Type) -> Type:
+    """A range as far as a register can hold it."""
+    low, high = (max(-LARGEST_NUMBER, min(end, LARGEST_NUMBER)) for end in (type_.low, type_.high))
+    return replace(type_, low=low, high=high)
 
 
 def _sources(path: str, read: Mapping[str, set[str]]) -> set[str]:
@@ -573,6 +575,11 @@ class _Run:
             [line for npc in self._symbols.cast if npc != AGENT for line in spoken.get(npc, {}).values()],
             [one.tone for one in inhabitants],
         )
+        if len(words) + len(UNSPOKEN) > MOST_WORDS:
+            most = MOST_WORDS - len(UNSPOKEN)
+            message = f"its texts have {len(words):,} different words; at most {most:,} are told apart"
+            findings.error("S106", message, findings.places.key_span(("scenario",)))
+            return None
         return CheckedScenario(
             name=name,
             horizon=scenario.horizon,
@@ -632,12 +639,20 @@ class _Run:
     def _spoken(self) -> dict[str, dict[DataPath, Line]]:
         """What everybody says, before what anybody hears: member -> the lines of its frame."""
         found = {member: behaviour.lines_of(self.resolver, played) for member, played in self._played.items()}
+        together = 0
         for member, spoken in found.items():
             for line in spoken.values():
-                if number_of_texts(line) > MAX_TEXTS:
-                    message = f"this can be {number_of_texts(line)} different texts; at most {MAX_TEXTS} are possible"
+                number, before = number_of_texts(line), together
+                together += number
+                if number > MAX_TEXTS:
+                    message = f"this can be {number} different texts; at most {MAX_TEXTS} are possible"
                     self._findings.error("S212", message, line.span)
-                elif member != AGENT:
+                elif before <= MAX_ALL_TEXTS < together:
+                    message = (
+                        f"all lines up to here can be {together} texts; at most {MAX_ALL_TEXTS} are possible"
+                    )
+                    self._findings.error("S212", message, line.span)
+                elif member != AGENT and together <= MAX_ALL_TEXTS:
                     self.resolver.utterances.add_npc_texts(member, texts_of(line))
         for member, played in self._played.items():
             if member != AGENT and performs(played.model):
@@ -776,12 +791,12 @@ class _Run:
                 found.setdefault(drawn.path.partition("(")[0], far)
                 spans[drawn.path] = drawn.value.span
         for path, far in found.items():
-            declaration = registers.declaration(path)
+            declaration, hint = registers.declaration(path), "bound it: `min(..., 1000)`"
             if declaration is None:
-                self._findings.too_large("this", far, spans[path], hint="bound it: `min(..., 1000)`")
+                self._findings.too_large("this", far, spans[path], hint=hint)
                 continue
-            name, hint = declaration.source[-1], "bound it: `min(..., 1000)`"
-            if path in grown:
+            name, source = declaration.label, declaration.source
+            if path in grown and registers.is_set(path):
                 hint = f"bound what it is set to: `set: {{{name}: min({name} * 2, 100)}}`"
-            span = places.key_span(declaration.source)
-            self._findings.too_large(f"`{declaration.label}`", far, span, hint=hint)
+            span = places.key_span(source if source[-1] == name else source[:-1])
+            self._findings.too_large(f"`{name}`", far, span, hint=hint)

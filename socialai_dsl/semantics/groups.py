@@ -51,6 +51,7 @@ from socialai_dsl.semantics.terms import (
 )
 
 MAX_GROUP = 256
+_WIDE = 4096
 MAX_WEIGHT = 100
 THOSE: Final = "those"
 _MOST_CELLS = 28 * 28
@@ -403,8 +404,8 @@ _ALL_COLORS = frozenset(range(COLOR.low, COLOR.high + 1))
 _DRAWN_FREELY = ("random", "distinct")
 
 
-def values_of(resolver: Resolver, term: Term) -> frozenset[int]:
-    """The values that a term can have; those of its whole type where nothing more is known."""
+def values_of(resolver: Resolver, term: Term) -> frozenset[int] | range:
+    """The values that a term can have; those of its whole type, which may be wide, where nothing more is known."""
     match term:
         case Const(value=value):
             return frozenset({value})
@@ -413,10 +414,17 @@ def values_of(resolver: Resolver, term: Term) -> frozenset[int]:
         case Quantification(op="pick" | "first" | "nearest", items=items):
             return frozenset(item.value for item in items)
         case Select(values=values, default=default):
-            return frozenset().union(*(values_of(resolver, value) for value in (*values, default)))
+            return _union([values_of(resolver, value) for value in (*values, default)])
         case FieldOf(entity=who, name="color"):
             return frozenset().union(*(_colors(resolver, number) for number in values_of(resolver, who)))
-    return frozenset(term.type.values)
+    return term.type.values
+
+
+def _union(parts: Sequence[frozenset[int] | range]) -> frozenset[int] | range:
+    """All of some values; of a wide range not one by one."""
+    if any(isinstance(part, range) and len(part) > _WIDE for part in parts):
+        return range(min(map(min, parts)), max(map(max, parts)) + 1)
+    return frozenset().union(*parts)
 
 
 def _colors(resolver: Resolver, number: int) -> frozenset[int]:

@@ -61,6 +61,9 @@ from socialai_dsl.vocabulary import Sentences, is_number, is_plain, normal
 MAX_TEXTS = 4096
 """How many different texts one line may have."""
 
+MAX_ALL_TEXTS = 1 << 15
+"""How many all lines may have together; those that several members say count for each."""
+
 
 class Utterances:
     """Everything that may be said: the sentences of the grammar by the agent, the texts of their lines by NPCs.

@@ -95,8 +95,8 @@ def of_key(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> Read 
         message = f"`{node.name}` takes one key: `{node.name}({example(resolver, path)})`"
         raise resolver.fail("S211", message, node, scope)
     key = resolver.value(node.args[0], groups.opened(known[0].type), scope)
-    possible = {key.value} if isinstance(key, Const) else set(key.type.values)
-    if not possible & {each.value for each in known}:
+    possible = numbers_of(key)  # of a wide range not one by one
+    if not any(each.value in possible for each in known):
         first, last = symbols.word(known[0]), symbols.word(known[-1])
         listed = first if first == last else f"{first} to {last}"
         message = f"there is no `{node.name}` for `{quoted(node.args[0])}`"

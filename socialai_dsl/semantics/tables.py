@@ -35,6 +35,7 @@ from socialai_dsl.vocabulary import is_number, is_plain
 
 _NO_KEYS = ("entity", "cell", "bool", "utterance")
 """Kinds of values that no words stand for."""
+_WIDE = 4096
 
 
 def look_at_all(resolver: Resolver) -> None:
@@ -55,7 +56,8 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     known = numbers_of(key)
     possible = values_of(resolver, key)
     cases: dict[int, Term] = {}
-    for value in known:
+    # Few values far from each other have a wide type.
+    for value in sorted(possible) if isinstance(possible, frozenset) and len(known) > _WIDE else known:
         word = spoken(key.type, value)
         if word not in keys and value not in possible:
             continue

@@ -109,7 +109,7 @@ class ReadEach:
     def may_miss(self) -> bool:
         """Whether the key may be something that is not in the group."""
         type_ = self.key.type
-        return not set(self.keys) >= set(type_.values)
+        return type_.size > len(self.keys) or not set(self.keys) >= set(type_.values)
 
     def known(self) -> Read | None:
         """The register itself, if it is known which."""

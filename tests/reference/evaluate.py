@@ -354,8 +354,13 @@ def weighed(node: Any) -> list[tuple[Any, int]]:
     ]
 
 
-def _interval(node: ast.Interval, context: Context) -> list[int]:
-    return list(range(of(node.low, context), of(node.high, context) + 1))
+_MOST_LISTED = 1000
+"""Of a wider interval it is only asked where it ends and what lies within."""
+
+
+def _interval(node: ast.Interval, context: Context) -> list[int] | range:
+    numbers = range(of(node.low, context), of(node.high, context) + 1)
+    return list(numbers) if len(numbers) <= _MOST_LISTED else numbers
 
 
 def _arithmetic(node: ast.Arithmetic, context: Context) -> Any:

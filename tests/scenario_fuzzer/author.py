@@ -31,6 +31,8 @@ TEMPLATES = ("Say <noun>", "Where is <noun>", "It is <noun>", "Give me <noun>", 
 SAYINGS = ("Good day", "Look at me!", "Stop it.")
 """What some NPC says in every scenario that has a frame."""
 WORDS = ("ana", "bel", "cor", "dol", "ers", "fit")
+EDGES = (*(1 << n for n in (7, 8, 15, 16, 19, 20, 24)), 1_000_000_000)
+"""Where a number might no longer fit; the last is the greatest that is kept."""
 LOOKS = {
     "size": ("small", "large"),
     "pattern": ("plain_one", "striped", "spotted"),
@@ -70,6 +72,8 @@ class _Author:
     def scenario(self, name: str) -> dict[str, Any]:
         """The whole file, in an order in which what is spoken of is known."""
         self.acts, self.slotted = self.actions(), self.often(0.4)
+        if self.often(0.4):
+            self.declared.edge = self.rng.choice(EDGES) * self.rng.choice((1, 1, -1))
         behaviour = Behaviour(self.rng, self.declared, self.phrases, self.acts)
         made: dict[str, Any] = {
             "scenario": name,
@@ -307,6 +311,10 @@ class _Author:
         if self.often(0.5):
             made["tint"] = self.rng.choice(("pick(colors)", "pick(red | 2 * blue)"))
             self.declared.colors.append("tint")
+        if self.declared.edge:
+            low, high = self.around_the_edge()
+            made["code"] = self.rng.choice((f"pick({low}..{high})", f"pick({low} | {high})"))
+            self.declared.wide.append("code")
         for thing in self.declared.several:
             if self.often(0.6):
                 name = f"the_{thing.name}"
@@ -352,7 +360,20 @@ class _Author:
             self.declared.numbers.append(name)
             self.declared.registers.append(name)
         self.declared.rows = self.rows("score", "news")
+        if self.declared.edge:
+            low, high = self.around_the_edge()
+            made["hoard"] = {"start": self.rng.choice((0, low, high, f"pick({low} | 0)"))}
+            if self.often(0.5):
+                made["hoard"]["range"] = f"{min(low, 0)}..{max(high, 0)}"
+            made["vault"] = {"start": 0, "for": f"{low}..{high}", "range": f"{min(low, -3)}..{max(high, 3)}"}
+            self.declared.wide.append("hoard")
+            self.declared.vault = (low, high)
         return made | self.starts(self.declared.rows)
+
+    def around_the_edge(self) -> tuple[int, int]:
+        """Numbers from just below to just above the edge, which are kept."""
+        most = EDGES[-1]
+        return max(-most, self.declared.edge - 2), min(most, self.declared.edge + 1)
 
     def rows(self, kept: str, single: str) -> list[Row]:
         """Registers for each of a group, and single ones that begin with nothing."""

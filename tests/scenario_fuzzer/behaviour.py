@@ -157,6 +157,9 @@ class Behaviour:
         found: dict[str, Callable[[], str]] = {
             name: lambda: self.phrases.number(where) for name in self.declared.registers
         }
+        if self.declared.edge:
+            found["hoard"] = lambda: self.large(where)
+            found[f"vault({self.phrases.wide(where)})"] = lambda: self.large(where)
         for row in [*self.declared.rows, *(where.frame.rows if where.frame else [])]:
             if row.keys is not None and self.often(0.25):
                 found |= self.of_those(row, where)
@@ -181,6 +184,16 @@ class Behaviour:
                 if name not in frame.slots
             }
         return found
+
+    def large(self, where: Where) -> str:
+        """A value that a register may have no room for, unless that is cut."""
+        rng, wide = self.rng, self.phrases.wide
+        step = rng.choice((1, 3, abs(self.declared.edge)))
+        grown = rng.choice(
+            (f"hoard + {step}", f"hoard - {step}", f"{wide(where)} - hoard", f"{wide(where)} * 2")
+        )
+        most = abs(self.declared.edge)
+        return f"max(min({grown}, {most}), {-most})"
 
     def target(self, row: Row, where: Where) -> str:
         """Which of a row is set, or all of it."""

@@ -79,6 +79,12 @@ class Declared:
     follows: dict[str, Frame] = field(default_factory=dict)  # NPC, group or agent: its frame
     beliefs: dict[str, dict[str, str]] = field(default_factory=dict)  # member: belief: sort
     numbers: list[str] = field(default_factory=list)  # registers of the world and lets
+    edge: int = 0  # a number at the edge of something's width; 0 where all numbers are small
+    vault: tuple[int, int] = (
+        0,
+        0,
+    )  # the least and greatest key of a register for each number around the edge
+    wide: list[str] = field(default_factory=list)  # registers of the world and lets that may come to it
     registers: list[str] = field(default_factory=list)  # those of them that rules can set
     rows: list[Row] = field(default_factory=list)  # registers of the world for each of a group
     colors: list[str] = field(default_factory=list)  # lets that hold a colour

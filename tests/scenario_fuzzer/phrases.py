@@ -277,11 +277,26 @@ class Phrases:
                 lambda: f"({self.number(where, depth - 1)} {rng.choice(('//', '%'))} {rng.randint(1, 4)})",
             ]
         options += self.kept("number", where)
+        if known.wide:
+            options += [
+                lambda: f"({self.wide(where)} {rng.choice(('//', '%'))} {rng.choice((3, known.edge))})"
+            ]
         if known.nouns_are_numbers:
             options += ["noun", "noun"] if where.noun else []
             options += ["agent.noun"] if not where.reset else []
         options += self.in_slots(where, "num")
         return self.chosen(lambda: self.one_of(*options), where)
+
+    def wide(self, where: Where) -> str:
+        """A number that may be large."""
+        rng, known = self.rng, self.declared
+        low, high = known.vault
+        options: list[str | Callable[[], str]] = [str(known.edge), *known.wide, *known.wide]
+        if not where.reset and known.vault != (0, 0):
+            options += [f"vault({rng.randint(low, high)})", "vault(code)"]
+        if where.reset:
+            options = [str(known.edge), *(name for name in known.wide if name != "hoard")]
+        return self.one_of(*options)
 
     def counted(self, where: Where) -> str:
         """How many of a group."""
@@ -416,6 +431,9 @@ class Phrases:
             lambda: f"{self.member(where)}.facing == {self.direction(where)}",
             lambda: f"{self.entity(where)}.color in red | {self.rng.choice(COLORS[1:])}",
             lambda: f"{self.number(where, 0)} in {self.rng.randint(0, 3)}..{self.rng.randint(3, 7)}",
+            *([lambda: f"{self.wide(where)} {self.rng.choice(('<', '==', '>='))} {self.wide(where)}"] * 2)
+            if self.declared.wide
+            else (),
         )
 
     def defined(self, where: Where) -> str:

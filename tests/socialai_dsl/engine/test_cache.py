@@ -71,7 +71,6 @@ def test_the_key_covers_every_source_of_the_engine(tmp_path: Path, monkeypatch: 
         package / "draws.py",
         package / "vocabulary.py",
         package / "widths.py",
-        "widths.py",
     ]:
         (copy / source.relative_to(package)).write_bytes(source.read_bytes())
     monkeypatch.setattr(cache, "__file__", str(copy / "engine" / "cache.py"))
