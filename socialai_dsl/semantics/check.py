@@ -273,6 +273,8 @@ class Ranges:
         growing = {path for path, more in excess.items() if more > self._gains.get(path, 0)}
         if not growing:
             return not self._gains or any(excess.values()) or not self._narrow(needed)
+        if self._rounds > self._steps:
+            return True  # as often as that nothing is set in an episode
         spreads = bool(growing - self._grew) or growing < self._growing
         widens = self._rounds > _PATIENCE and (bool(self._gains) or not spreads)
         self._grew |= growing
@@ -795,8 +797,9 @@ class _Run:
             if declaration is None:
                 self._findings.too_large("this", far, spans[path], hint=hint)
                 continue
-            name, source = declaration.label, declaration.source
+            name, source, when = declaration.label, declaration.source, ""
             if path in grown and registers.is_set(path):
+                when = " in an episode"
                 hint = f"bound what it is set to: `set: {{{name}: min({name} * 2, 100)}}`"
             span = places.key_span(source if source[-1] == name else source[:-1])
-            self._findings.too_large(f"`{name}`", far, span, hint=hint)
+            self._findings.too_large(f"`{name}`", far, span, when, hint=hint)

@@ -114,11 +114,11 @@ class Findings:
         """Report a warning."""
         self.bag.warning(code, message, span, **more)
 
-    def too_large(self, what: str, far: int, span: Span, **more: str | None) -> FailedError:
+    def too_large(self, what: str, far: int, span: Span, when: str = "", **more: str | None) -> FailedError:
         """Report a number that nothing can keep; raising the result gives up the value it is in."""
         number = f"{far:,}" if abs(far) < _EXACTLY else f"{far:.1e}"
         limit = LARGEST_NUMBER if far > 0 else -LARGEST_NUMBER
-        message = f"{what} can be {number}, and numbers go {'up' if far > 0 else 'down'} to {limit:,}"
+        message = f"{what} can be {number}{when}, and numbers go {'up' if far > 0 else 'down'} to {limit:,}"
         return self.fail("S106", message, span, **more)
 
     def no_such(self, word: str, message: str, span: Span, **more: str | None) -> FailedError:
