@@ -568,9 +568,9 @@ def _registers(program: Program) -> None:
     _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
     named = [name.register for name in program.registers]
     _require(len(set(named)) == len(named), "a register has two names")
-    for name in program.registers:
-        fits = WHOLE_REGISTER[0] <= name.low <= name.high <= WHOLE_REGISTER[1]
-        _require(fits, f"{name.path} holds {name.low}..{name.high}, which no register does")
+    for own in program.registers:
+        fits = WHOLE_REGISTER[0] <= own.low <= own.high <= WHOLE_REGISTER[1]
+        _require(fits, f"{own.path} holds {own.low}..{own.high}, which no register does")
     for start, end, name in areas:
         _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
 

@@ -420,7 +420,7 @@ def values_of(resolver: Resolver, term: Term) -> frozenset[int] | range:
     return term.type.values
 
 
-def _union(parts: Sequence[frozenset[int] | range]) -> frozenset[int] | range:
+def _union(parts: list[frozenset[int] | range]) -> frozenset[int] | range:
     """All of some values; of a wide range not one by one."""
     if any(isinstance(part, range) and len(part) > _WIDE for part in parts):
         return range(min(map(min, parts)), max(map(max, parts)) + 1)
