@@ -148,9 +148,9 @@ class _Looker:
         self._remembered = [name.register for name in program.registers if name.path.startswith(NOTED)]
 
     @property
-    def _registers(self) -> NDArray[np.int16]:
+    def _registers(self) -> NDArray[np.int32]:
         """Those of the moment looked at, int16 (R,)."""
-        registers: NDArray[np.int16] = self._table.state.registers[0]
+        registers: NDArray[np.int32] = self._table.state.registers[0]
         return registers
 
     def look(self, moment: Start, begins: bool) -> None:
