@@ -153,7 +153,7 @@ class Search:
             return Finding(SearchVerdict.UNDECIDED, len(self._parents), None, False)
 
     def _solved(
-        self, registers: NDArray[np.int16], board: NDArray[np.uint32], key: NDArray[np.uint64], states: int
+        self, registers: NDArray[np.int32], board: NDArray[np.uint32], key: NDArray[np.uint64], states: int
     ) -> Finding:
         state = self._table.state
         layer = _Layer(
