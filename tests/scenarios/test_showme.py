@@ -112,10 +112,20 @@ class TestThePeer:
             on_the_door += episode.now()["jim"]["at"] == [3, 0]
         assert on_the_door == 1
 
-    @pytest.mark.parametrize(("name", "step"), [("showme+as_coded", 2), ("showme", 1)])
-    def test_as_coded_it_looks_before_it_turns(self, name: str, step: int) -> None:
-        heard = Episode(name, ROOM).hears(None, None)
-        assert [bool(line) for line in heard] == [step == 1, step == 2]
+    @pytest.mark.parametrize("name", NAMES)
+    @pytest.mark.parametrize(("facing", "turns"), [("right", 0), ("down", 1), ("up", 1), ("left", 2)])
+    def test_it_looks_after_it_has_turned_and_speaks_in_the_same_step(
+        self, name: str, facing: str, turns: int
+    ) -> None:
+        """Also where its own turn has made the eye contact; it moves from the next step on."""
+        episode = Episode(name, {**ROOM, "jim": {"at": [2, 3], "facing": facing}})
+        silent = max(turns, 1) - 1
+        heard = episode.hears(*[None] * (silent + 1))
+        assert [bool(line) for line in heard] == [False] * silent + [True]
+        now = episode.now()["jim"]
+        assert (now["at"], now["facing"]) == ([2, 3], "right")
+        episode.act()
+        assert episode.now()["jim"]["facing"] != "right", "the switches are below"
 
     def test_as_coded_it_stands_still_while_it_says_so(self) -> None:
         room = {**ROOM, "jim": {"at": [2, 3], "facing": "right"}}
