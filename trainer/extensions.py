@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trainer.config import code_file
 
@@ -50,9 +51,25 @@ def load_class(name: str, option: str, shipped: Sequence[str], needed: type, fol
 
 
 def require_shape(what: str, array: Any, shape: tuple[int, ...]) -> None:
-    """Refuse, with a ValueError, an array of the user's code that NumPy would stretch or stumble over."""
-    if np.shape(array) != shape:
-        raise ValueError(f"{what}: got the shape {np.shape(array)}, expected {shape}")
+    """Refuse, with a ValueError, an array or tensor of the user's code that would be stretched or stumbled over."""
+    if tuple(array.shape) != shape:
+        raise ValueError(f"{what}: got the shape {tuple(array.shape)}, expected {shape}")
+
+
+def require_array(what: str, given: Any, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[Any]:
+    """An array of the user's code in the type that is needed.
+
+    Raises:
+        ValueError: NumPy would stretch it, cut its numbers off or stumble over it.
+    """
+    try:
+        array = np.asarray(given)
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise ValueError(f"{what}: got what is no array ({error}), expected the shape {shape}") from error
+    require_shape(what, array, shape)
+    if not np.can_cast(array.dtype, dtype, "same_kind"):
+        raise ValueError(f"{what}: got the type {array.dtype}, expected {np.dtype(dtype)}")
+    return array.astype(dtype)
 
 
 def _load_module(name: str, option: str, folder: Path) -> ModuleType:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from trainer.errors import ObservationError
+from trainer.extensions import require_shape
 from trainer.nets import ActorCritic
 from trainer.nets.dialogue import prefix_tree
 
@@ -122,7 +123,9 @@ class Actor:
         history_rows, text_index = np.unique(pairs[:, 1], return_inverse=True)
         prepared = self.net.prepare(self.move(self.images.data[image_rows]))
         texts = self._texts[self.move(history_rows)]
-        return self.net.perceive(prepared, texts, self.move(image_index), self.move(text_index))
+        found = self.net.perceive(prepared, texts, self.move(image_index), self.move(text_index))
+        require_shape("net: the result of perceive", found, (len(pairs), self.net.features))
+        return found
 
     def _hear(self, ids: Int64, tokens: NDArray[np.int16]) -> Int64:
         """Row of every history, int64 (E,); new ones are encoded."""

@@ -66,7 +66,7 @@ class Metrics:
         self._session = session
         self._counted, self._time = session.envs.counters(), time.perf_counter()
 
-    def row(self, tally: Tally, losses: Mapping[str, float]) -> dict[str, Any]:
+    def row(self, tally: Tally, losses: Mapping[str, float | None]) -> dict[str, Any]:
         """The row of the update just made, which took from the last call until now."""
         session, config, before, began = self._session, self._session.config, self._counted, self._time
         self._counted, self._time = session.envs.counters(), time.perf_counter()

@@ -78,15 +78,33 @@ def estimate_advantages(config: RunConfig, rollout: Rollout) -> Batch:
 # -- loss ---------------------------------------------------------------------------------------------------------
 
 
+class Figures(NamedTuple):
+    """Means of F figures, (F,), and how many entries each is a mean over, (F,); of none it is not a number."""
+
+    means: Tensor
+    counts: Tensor
+
+    @classmethod
+    def pooled(cls, some: Sequence[Figures]) -> Figures:
+        """The means over the entries of all."""
+        means, counts = (torch.stack(column) for column in zip(*some, strict=True))  # (K, F) each
+        totals = torch.where(counts > 0, means * counts, 0).sum(0)
+        return cls(totals / counts.sum(0), counts.sum(0))
+
+
 class LossParts(NamedTuple):
-    """Parts of the loss, scalars; only the first has gradients.
+    """The loss, and figures about it; all are scalars but the last, and only the first has gradients.
+
+    Each figure is a mean over the frames that it is about: policy, entropy, divergence and clipping those in which the
+    agent acted by itself, imitation those that a guide shows, by weight. Of no frames it is not a number.
 
     Attributes:
-        loss: what is minimised.
+        loss: what is minimised: a mean over all frames, each with the terms that it has.
         policy_loss, value_loss, entropy: its terms before their coefficients; entropy in nats.
-        approx_kl: estimated divergence of the new policy from the one that acted (Schulman 2020, k3).
+        approx_kl: estimated divergence of the new policy from the one that acted (Schulman 2020, k3), nats.
         clip_fraction: share of ratios outside the clipping range.
-        imitation_loss: cross-entropy between the policy and a guide's actions.
+        imitation_loss: cross-entropy between the policy and a guide's actions, nats.
+        counts: (7,), the number of entries that each of these is a mean over.
     """
 
     loss: Tensor
@@ -96,10 +114,16 @@ class LossParts(NamedTuple):
     approx_kl: Tensor
     clip_fraction: Tensor
     imitation_loss: Tensor
+    counts: Tensor
+
+    def figures(self) -> Figures:
+        """All of them without gradients, in the order of `STATISTICS`."""
+        *means, counts = self
+        return Figures(torch.stack(means).detach(), counts)
 
 
-STATISTICS = (*LossParts._fields, "grad_norm")
-"""What is known of a gradient step; the last is the gradient's norm before clipping."""
+STATISTICS = LossParts._fields[:-1]
+"""The figures that are known of a gradient step."""
 
 SHORTER, LONGER = 0.5, 1.25
 """What the learning rate is multiplied by after an update that left the trust region, and after one that did not."""
@@ -153,25 +177,30 @@ def ppo_loss(
         policy_term, value_term = (policy * mask).mean(), (value[:, None] * mask).mean()
         entropy_term = entropy.mean() / len(sizes)
     total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
-    imitation = torch.zeros((), device=logits.device)
+    shown, imitation = torch.zeros_like(own), torch.zeros((), device=logits.device)  # (N,), scalar
     if batch.lead is not None:
-        shown = batch.lead.actions  # (N, H)
-        shown_log_probs = heads.log_probs_and_entropies(logits, shown, sizes)[0] * heads.spoken_mask(
-            shown, used
-        )
-        imitation = -(shown_log_probs.sum(-1) * batch.lead.weights).mean()
+        shown, example = batch.lead.weights, batch.lead.actions  # (N,), (N, H)
+        likely, _ = heads.log_probs_and_entropies(logits, example, sizes)
+        imitation = -((likely * heads.spoken_mask(example, used)).sum(-1) * shown).mean()
         total = total + config.imitation_coef * imitation
     with torch.no_grad():
-        kl = (ratio - 1 - log_ratio).mean()
-        clip_fraction = ((ratio - 1).abs() > config.clip).float().mean()
-        known = (policy_term, value_term, entropy.mean(), kl, clip_fraction, imitation)
-        return LossParts(total, *(part.detach() for part in known))
+        joint = change.sum(-1)  # (N,), the log-ratio of the whole action
+        kl = (joint.exp() - 1 - joint).mean()
+        took_part = own[:, None] if config.loss == "joint" else mask * own[:, None]  # (N, 1) or (N, H)
+        outside = ((ratio - 1).abs() > config.clip).to(values.dtype) * took_part
+        # Means over all frames, to which frames that a figure is not about have added 0.
+        figures = torch.stack((total, policy_term, value_term, entropy.mean(), kl, outside.mean(), imitation))
+        everywhere = torch.ones_like(own).mean()
+        of_own = own.mean()
+        shares = (everywhere, of_own, everywhere, of_own, of_own, took_part.mean(), shown.mean())
+        parts = figures / torch.stack(shares)
+        return LossParts(total, *parts[1:], torch.stack(shares) * len(values))
 
 
 # -- update -------------------------------------------------------------------------------------------------------
 
 
-def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str, float]:
+def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str, float | None]:
     """Improve the network on one rollout: `epochs` passes over its minibatches, each a gradient step.
 
     A minibatch's shares are differentiated by the mapper's threads; their gradients are added up.
@@ -181,9 +210,13 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     and later steps are shorter. No minibatch measures the last step of an update. Adam's steps are long even where
     gradients are tiny, so one of them can undo what a nearly certain policy has learnt.
 
+    Where a guide led, the policy that played was not the agent's, so `target_kl` heeds the agent's own frames alone; a
+    minibatch without any ends nothing.
+
     Returns:
-        Means over the minibatches of `STATISTICS` by name, the share of the value's variance that the critic
-        explained, and the learning rate.
+        `STATISTICS` by name, means over the minibatches, None where they have no frame of that kind; the mean norm of
+        the gradient before clipping; the share of the value's variance that the critic explained, in all frames; and
+        the learning rate.
 
     Raises:
         TrainingStopped: a loss, a gradient or a weight is not finite.
@@ -193,26 +226,30 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     parameters = list(net.parameters())
     batch = estimate_advantages(config, rollout)
 
-    def differentiate(share: Environments | Chunks) -> tuple[Tensor, Sequence[Tensor | None]]:
+    def differentiate(share: Environments | Chunks) -> tuple[Figures, Sequence[Tensor | None]]:
         parts = [ppo_loss(*part, sizes, config, session.entropy_coef, used) for part in share.evaluate(net)]
         loss = torch.stack([part.loss for part in parts]).mean() * share.weight
-        statistics = torch.stack([torch.stack(part).detach() for part in parts]).mean(0) * share.weight
-        return statistics, torch.autograd.grad(loss, parameters, allow_unused=True)
+        found = Figures.pooled([part.figures() for part in parts])
+        return found, torch.autograd.grad(loss, parameters, allow_unused=True)
 
-    steps: list[Tensor] = []
+    steps: list[Figures] = []
+    norms: list[Tensor] = []
     trusted: list[Tensor] = []  # the weights before the last gradient step
     cut = chunks if config.update == "chunks" else environments
     for shares in cut(session, rollout, batch):
-        parts, gradients = zip(*mapper(differentiate, shares), strict=True)
+        found, gradients = zip(*mapper(differentiate, shares), strict=True)
         for parameter, *own in zip(parameters, *gradients, strict=True):
             parameter.grad = _sum(parameter, own)
-        statistics = torch.stack(parts).sum(0)
-        require_finite("the loss", statistics[0])
-        norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
-        require_finite("a gradient", norm)
-        steps.append(torch.cat((statistics, norm[None])))
+        means, counts = Figures.pooled(found)
+        require_finite("the loss", means[0])
+        steps.append(
+            Figures(means, counts / counts[0])
+        )  # by shares of its frames, so that minibatches count equally
+        norms.append(nn.utils.clip_grad_norm_(parameters, config.max_grad_norm))
+        require_finite("a gradient", norms[-1])
         if config.target_kl is not None:
-            if trusted and float(statistics[STATISTICS.index("approx_kl")]) > config.target_kl:
+            # Not a number, and so not above the limit, where no frame is the agent's own.
+            if trusted and float(means[STATISTICS.index("approx_kl")]) > config.target_kl:
                 with torch.no_grad():
                     for parameter, value in zip(parameters, trusted, strict=True):
                         parameter.copy_(value)
@@ -225,11 +262,14 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     for name, value in net.state_dict().items():  # also of its buffers
         require_finite(f"an entry of the network's {name}", value)
     unexplained = (batch.returns - batch.values).var(correction=0) / (batch.returns.var(correction=0) + 1e-8)
-    figures = dict(zip(STATISTICS, torch.stack(steps).mean(0).tolist(), strict=True))
+    known = zip(STATISTICS, *(column.tolist() for column in Figures.pooled(steps)), strict=True)
+    figures = {name: mean if share else None for name, mean, share in known}
+    figures["grad_norm"] = float(torch.stack(norms).mean())
     figures["explained_variance"] = 1 - float(unexplained)
     figures["learning_rate"] = session.optimizer.param_groups[0]["lr"]
     for name, figure in figures.items():
-        require_finite(f"{name} of the update", figure)
+        if figure is not None:
+            require_finite(f"{name} of the update", figure)
     return figures
 
 

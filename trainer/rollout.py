@@ -11,7 +11,7 @@ from torch import Tensor
 
 from trainer import actions as heads
 from trainer.errors import require_finite
-from trainer.extensions import require_shape
+from trainer.extensions import require_array, require_shape
 from trainer.features import Actor, Int64
 from trainer.guides import Guide, Lead
 from trainer.logging import Tally
@@ -71,6 +71,8 @@ def collect(session: Session) -> Rollout:
             memories.append(memory)
         output, state.memory = net.memory.step(features, memory)
         logits, values = net.heads(output)  # (E, A), (E,)
+        require_shape("net: logits of heads", logits, shape[1:])
+        require_shape("net: values of heads", values, shape[1:2])
         actions = heads.choose(logits + noise[t], sizes)  # (E, H)
         if session.guide is not None:
             actions, given = _follow(session, session.guide, actions, tally)
@@ -97,25 +99,45 @@ def _ids(envs: Any) -> tuple[Int64, Int64]:
 def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[Tensor, Lead]:
     """Ask the guide; returns the actions to play, int64 (E, H): its own where it leads, else those of the policy."""
     state, move = session.state, session.actor.move
-    given = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
-    for name, part, shape in zip(Lead._fields, given, (own.shape, own.shape[:1], own.shape[:1]), strict=True):
-        require_shape(f"guide: {name} of lead", part, tuple(shape))
-    sizes = session.envs.single_action_space.nvec
-    asked = given.led | (given.weights != 0)
-    outside = np.flatnonzero(asked & ((given.actions < 0) | (given.actions >= sizes)).any(axis=1))
-    if len(outside):
-        row = int(outside[0])
-        raise ValueError(
-            f"guide: got the action {given.actions[row].tolist()} in row {row}, "
-            f"expected numbers from 0 to below {sizes.tolist()}"
-        )
+    found = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
+    given = _checked(found, tuple(own.shape), session.actor.net.spec.action_sizes)
     state.led |= given.led
-    lead = Lead(*(move(part.copy()) for part in given))
+    lead = Lead(*map(move, given))
     silent = heads.spoken_mask(lead.actions, session.actor.net.spec.used) == 0  # (E, H)
     agrees = ((own == lead.actions) | silent).all(1)  # (E,)
     tally.led_steps += int(lead.led.sum())
     tally.agreed_steps += int((agrees & lead.led).sum())
     return torch.where(lead.led[:, None], lead.actions, own), lead
+
+
+def _checked(found: Any, shape: tuple[int, ...], sizes: tuple[int, ...]) -> Lead:
+    """What a guide returned, for actions of a shape (E, H) with so many choices of each head.
+
+    Raises:
+        ValueError: arrays of another shape or type, a choice that there is not, a negative weight.
+        TrainingStopped: a weight is not finite.
+    """
+    if not isinstance(found, tuple) or len(found) != len(Lead._fields):
+        raise ValueError(f"guide: lead returned {type(found).__name__}, expected Lead(actions, led, weights)")
+    needed = ((shape, np.int64), (shape[:1], np.bool_), (shape[:1], np.float32))
+    given = Lead(
+        *(
+            require_array(f"guide: {name} of lead", part, *one)
+            for name, part, one in zip(Lead._fields, found, needed, strict=True)
+        )
+    )
+    asked = given.led | (given.weights != 0)
+    strange = asked & ((given.actions < 0) | (given.actions >= sizes)).any(1)  # (E,)
+    if strange.any():
+        row = int(strange.argmax())
+        raise ValueError(
+            f"guide: actions of lead: got {given.actions[row].tolist()} for environment {row}, expected whole numbers "
+            f"from 0 to {[size - 1 for size in sizes]}"
+        )
+    require_finite("a weight that the guide's lead returned", torch.from_numpy(given.weights))
+    if (given.weights < 0).any():
+        raise ValueError(f"guide: weights of lead: got {given.weights.min():g}, expected at least 0")
+    return given
 
 
 def _step(
@@ -140,8 +162,9 @@ def _step(
         tally.count(state, ended, cut, success)
         state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
     if session.bonus is not None:
-        paid = session.bonus.step(envs, observation["image"], ended)
-        require_shape("bonus: the result of step", paid, ended.shape)
+        found = session.bonus.step(envs, observation["image"], ended)
+        paid = require_array("bonus: the result of step", found, ended.shape, np.float64)
+        require_finite("what the bonus paid", torch.from_numpy(paid))
         tally.bonus += float(paid.sum()) / config.frames_per_update
         reward = reward + paid
     return reward.astype(np.float32), ended, bootstrap

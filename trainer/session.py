@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from torch import Tensor
 
@@ -29,6 +30,16 @@ Mapper = Callable[..., Iterable[Any]]
 """`map`, or that of a pool of threads."""
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
+_NEEDED = (
+    "program",
+    "counters",
+    "image_ids",
+    "history_ids",
+    "utterance_ids",
+    "scripted_actions",
+    "snapshot",
+    "restore",
+)
 _WORDS = ("actions", "templates", "nouns", "vocabulary")
 
 
@@ -104,8 +115,9 @@ class Session:
             ValueError: the environments do not fit the configuration or the program, or are not of the form the
                 trainer learns.
         """
-        if envs.num_envs != config.envs:
-            raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+        if config.frames < 1:
+            raise ValueError(f"frames: got {config.frames}, expected at least 1")
+        _check_form(config, envs)
         if program is not None:
             _check_alike(program, envs.program)
         folder = config.code_folder
@@ -274,6 +286,18 @@ def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
         reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
         where = f"training stopped after {session.frames} frames (update {session.update})"
         raise TrainingStopped(f"{where}: {reason}; {kept}") from error
+
+
+def _check_form(config: RunConfig, envs: Any) -> None:
+    """Refuse environments that are not a vector of the configured number, restarted as the trainer expects."""
+    needed = 'expected socialai_dsl.make_vec(..., autoreset_mode="SameStep")'
+    if not isinstance(envs, VectorEnv) or not all(hasattr(envs, name) for name in _NEEDED):
+        raise ValueError(f"envs: got {type(envs).__name__}, {needed}")
+    if envs.num_envs != config.envs:
+        raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+    mode = envs.metadata.get("autoreset_mode")
+    if mode != AutoresetMode.SAME_STEP:
+        raise ValueError(f"envs: got the autoreset mode {getattr(mode, 'value', mode)}, {needed}")
 
 
 def _check_alike(program: Any, played: Any) -> None:

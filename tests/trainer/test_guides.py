@@ -1,5 +1,6 @@
 """A guide leads and is imitated; led steps give PPO nothing, and without a guide nothing is different."""
 
+import copy
 import json
 from collections.abc import Mapping
 from math import log
@@ -13,12 +14,13 @@ from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
+from trainer.actions import log_probs_and_entropies
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.guides import Lead, ScriptGuide
 from trainer.minibatch import Batch
 from trainer.play import CheckpointPolicy
-from trainer.ppo import estimate_advantages, ppo_loss, train
+from trainer.ppo import estimate_advantages, ppo_loss, train, update
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -43,16 +45,18 @@ def test_the_loss_of_led_and_own_frames_together() -> None:
     batch, logits = mixed_batch()
     config = RunConfig(imitation_coef=0.7)
     parts = ppo_loss(batch, logits, torch.full((3,), 1.5), (2, 2, 2, 2), config, entropy_coef=0.01)
-    policy = -2 * 1.2 / 3  # of the own frame alone, whose ratio 1.2 ** 4 is clipped
+    policy = -2 * 1.2  # of the own frame alone, whose ratio 1.2 ** 4 is clipped
     value = (1.5**2 + 0.5**2 + 1.5**2) / 3
-    entropy = -(2 + 0.6 * 2) * (0.6 * log(0.6) + 0.4 * log(0.4)) / 3
-    imitation = -(1.0 * 4 * log(0.6) + 0.5 * (log(0.6) + log(0.4))) / 3  # silent: no template, no noun
+    entropy = -(2 + 0.6 * 2) * (0.6 * log(0.6) + 0.4 * log(0.4))
+    imitation = -(1.0 * 4 * log(0.6) + 0.5 * (log(0.6) + log(0.4)))  # silent: no template, no noun
     assert parts.policy_loss.item() == pytest.approx(policy)
     assert parts.value_loss.item() == pytest.approx(value)
     assert parts.entropy.item() == pytest.approx(entropy)
-    assert parts.imitation_loss.item() == pytest.approx(imitation)
-    assert parts.loss.item() == pytest.approx(policy + 0.5 * value - 0.01 * entropy + 0.7 * imitation)
-    assert parts.approx_kl.item() == pytest.approx((1.2**4 - 1 - 4 * log(1.2)) / 3, rel=1e-5)
+    assert parts.imitation_loss.item() == pytest.approx(imitation / 1.5), "by weight"
+    assert parts.clip_fraction.item() == 1
+    assert parts.approx_kl.item() == pytest.approx(1.2**4 - 1 - 4 * log(1.2), rel=1e-5)
+    of_all = (policy - 0.01 * entropy + 0.7 * imitation) / 3 + 0.5 * value
+    assert parts.loss.item() == pytest.approx(of_all), "each frame with the terms that it has"
 
     parts.loss.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
@@ -60,6 +64,36 @@ def test_the_loss_of_led_and_own_frames_together() -> None:
     assert logits.grad[0].tolist() == pytest.approx([0.7 * 0.4 / 3, -0.7 * 0.4 / 3] * 4)
     shown = [0.35 * 0.4 / 3, -0.35 * 0.4 / 3, -0.35 * 0.6 / 3, 0.35 * 0.6 / 3]
     assert logits.grad[1].tolist() == pytest.approx([*shown, 0, 0, 0, 0])
+
+
+OF_OWN = ("policy_loss", "entropy", "approx_kl", "clip_fraction")
+
+
+@pytest.mark.parametrize("loss", ["joint", "per_head"])
+@pytest.mark.parametrize("led", range(11))
+def test_figures_of_the_agent_s_own_frames_do_not_depend_on_led_ones(led: int, loss: str) -> None:
+    """Whatever share of the frames a guide leads; where it leads all, they are not numbers."""
+    generator = torch.Generator().manual_seed(0)
+    actions = torch.randint(2, (10, 4), generator=generator)
+    logits, before, values, advantages = (
+        torch.randn(shape, generator=generator) for shape in ((10, 8), (10, 8), (10,), (10,))
+    )
+    config, sizes = RunConfig(loss=loss), (2, 2, 2, 2)
+    log_probs, _ = log_probs_and_entropies(before, actions, sizes)
+    lead = Lead(actions, torch.arange(10) < led, torch.ones(10))
+    batch = Batch(actions, log_probs, values, advantages, values + 1, lead)
+    parts = ppo_loss(batch, logits, values, sizes, config, 0.01)
+    assert np.isfinite([parts.loss.item(), parts.value_loss.item(), parts.imitation_loss.item()]).all()
+    own = slice(led, None)
+    alone = Batch(actions[own], log_probs[own], values[own], advantages[own], values[own] + 1)
+    expected = ppo_loss(alone, logits[own], values[own], sizes, config, 0.01)
+    for name in OF_OWN:
+        figure = getattr(parts, name).item()
+        if led == 10:
+            assert np.isnan(figure), name
+        else:
+            assert figure == pytest.approx(getattr(expected, name).item(), rel=1e-4), name
+    assert np.isnan(expected.imitation_loss.item()), "nobody showed anything"
 
 
 def guided(small_config: Any, **changes: Any) -> RunConfig:
@@ -84,6 +118,25 @@ def test_advantages_are_normalised_over_the_agent_s_own_steps(small_config: Any)
     own = advantages[~led]
     assert own.mean().item() == pytest.approx(0, abs=1e-6)
     assert own.std(correction=0).item() == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("led", [0, 7, 8])
+def test_the_trust_region_is_that_of_the_agent_s_own_frames(led: int, small_config: Any) -> None:
+    """Seven environments of eight led do not make it wider; all of them led, there is none."""
+    session = Session.start(small_config(epochs=3, minibatches=1, imitation_coef=0.0), envs())
+    rollout = collect(session)
+    leads = (torch.arange(8) < led).expand(8, 8)
+    rollout = rollout._replace(lead=Lead(rollout.actions, leads, torch.zeros(8, 8)))
+    figures = {}
+    for target in (1e6, None, 1e-9):
+        again = copy.deepcopy(session)
+        again.config = small_config(epochs=3, minibatches=1, imitation_coef=0.0, target_kl=target)
+        figures[target] = update(again, rollout)
+        (steps,) = {int(state["step"]) for state in again.optimizer.state.values()}
+        assert steps == (1 if target == 1e-9 and led < 8 else 3)
+    assert figures[None] == figures[1e6]
+    missing = {name for name, figure in figures[None].items() if figure is None}
+    assert missing == {"imitation_loss", *(OF_OWN if led == 8 else ())}
 
 
 def test_what_the_script_has_begun_it_plays_to_the_end() -> None:
@@ -234,8 +287,9 @@ def test_the_figures_show_the_phases(tmp_path: Path, small_config: Any) -> None:
     rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
     assert [row["led"] == 1 for row in rows[:4]] == [True] * 4
     assert [row["led"] for row in rows[-2:]] == [0, 0]
-    assert rows[-1]["agreement"] is None
-    assert rows[-1]["imitation_loss"] == 0
+    for row in rows:
+        assert {name for name in OF_OWN if row[name] is None} == set(OF_OWN if row["led"] == 1 else ())
+        assert (row["imitation_loss"] is None) == (row["agreement"] is None) == (row["led"] == 0)
     assert rows[-1]["success"] is not None
     train(small_config(), envs(), tmp_path / "alone")
     (first, *_) = (tmp_path / "alone" / "metrics.jsonl").read_text().splitlines()

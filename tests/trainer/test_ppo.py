@@ -348,6 +348,7 @@ def test_statistics_are_finite_and_complete(small_config: Any) -> None:
         "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
         "explained_variance", "learning_rate",
     }  # fmt: skip
+    assert statistics.pop("imitation_loss") is None, "nobody showed anything"
     assert np.isfinite(list(statistics.values())).all()
     assert 0 < statistics["entropy"] <= log(4) + log(2) + log(2) + log(4) + 1e-6
     assert exp(statistics["approx_kl"]) < 2

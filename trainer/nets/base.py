@@ -52,22 +52,34 @@ class NetSpec:
         """The sizes of an environment, single or vector.
 
         Raises:
-            ValueError: the spaces are not a `MultiDiscrete` of four or more and a `Dict` of `image` and `tokens`.
+            ValueError: the spaces are not a `MultiDiscrete` of four or more and a `Dict` of `image` and `tokens`, or do
+                not fit the program's words.
         """
         actions = getattr(envs, "single_action_space", envs.action_space)
-        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) < 4:
+        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) < 4 or actions.nvec[1] != 2:
             raise ValueError(
                 f"action space: got {actions}, expected MultiDiscrete([bodies, 2, templates, words, ...])"
             )
         observations = getattr(envs, "single_observation_space", envs.observation_space)
-        image = observations["image"] if isinstance(observations, spaces.Dict) else None
-        if not isinstance(image, spaces.Box) or len(image.shape) != 3 or "tokens" not in observations.spaces:
+        parts = observations if isinstance(observations, spaces.Dict) else {}
+        image, tokens = parts.get("image"), parts.get("tokens")
+        if not (_is_box(image, 3, np.uint8) and _is_box(tokens, 1, np.int16)):
             raise ValueError(
-                f"observation space: got {observations}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
+                f"observation space: got {observations}, expected Dict(image=Box(H, W, C) of uint8, tokens=Box(L) of "
+                "int16)"
             )
         high = np.asarray(image.high).reshape(-1, image.shape[2]).max(axis=0)
         words, used = tuple(envs.program.vocabulary), envs.program.sentences.used
+        shape = (len(used), *{len(row) for row in used})
+        if used and shape != (actions.nvec[2], len(actions.nvec) - 3):
+            raise ValueError(
+                f"action space: got {actions}, expected (templates, slots) = {shape} as in the program"
+            )
         return cls(tuple(actions.nvec.tolist()), image.shape, tuple(high.tolist()), words, used)
+
+
+def _is_box(space: Any, dimensions: int, dtype: type[np.generic]) -> bool:
+    return isinstance(space, spaces.Box) and len(space.shape) == dimensions and space.dtype == dtype
 
 
 class Heads(nn.Module):
