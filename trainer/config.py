@@ -115,7 +115,9 @@ class RunConfig(BaseModel):
         None, "weight of the entropy at the end, reached linearly; null: unchanged", ge=0
     )
     max_grad_norm: float = _option(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
-    target_kl: float | None = _option(None, "divergence beyond which a step is undone; null: no limit", gt=0)
+    target_kl: float | None = _option(
+        None, "divergence, in the agent's own frames, beyond which a step is undone; null: no limit", gt=0
+    )
     normalize_advantages: bool = _option(True, "scale advantages to mean 0, deviation 1 (paper: no)")
     loss: Literal["joint", "per_head"] = _option(
         "joint",

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from trainer import actions as heads
+from trainer import checkpoint as checkpoints
 from trainer.chunks import Chunks, chunks
 from trainer.config import RunConfig
 from trainer.errors import require_finite
@@ -188,13 +189,12 @@ def ppo_loss(
         kl = (joint.exp() - 1 - joint).mean()
         took_part = own[:, None] if config.loss == "joint" else mask * own[:, None]  # (N, 1) or (N, H)
         outside = ((ratio - 1).abs() > config.clip).to(values.dtype) * took_part
-        # Means over all frames, to which frames that a figure is not about have added 0.
-        figures = torch.stack((total, policy_term, value_term, entropy.mean(), kl, outside.mean(), imitation))
-        everywhere = torch.ones_like(own).mean()
-        of_own = own.mean()
-        shares = (everywhere, of_own, everywhere, of_own, of_own, took_part.mean(), shown.mean())
-        parts = figures / torch.stack(shares)
-        return LossParts(total, *parts[1:], torch.stack(shares) * len(values))
+        # Means over all frames, to which frames that a figure is not about have added 0, and the shares of the others.
+        means = (total, policy_term, value_term, entropy.mean(), kl, outside.mean(), imitation)
+        every, of_own = torch.ones_like(own).mean(), own.mean()
+        shares = torch.stack((every, of_own, every, of_own, of_own, took_part.mean(), shown.mean()))
+        _, *figures = torch.stack(means) / shares
+        return LossParts._make((total, *figures, shares * len(values)))
 
 
 # -- update -------------------------------------------------------------------------------------------------------
@@ -289,7 +289,7 @@ def _sum(parameter: Tensor, gradients: Sequence[Tensor | None]) -> Tensor | None
 def train(
     config: RunConfig,
     envs: Any,
-    run_dir: Path,
+    run_dir: Path | str,
     progress: Callable[[Mapping[str, Any]], None] = lambda row: None,
     resume: bool = False,
     tracker: Tracker | None = None,
@@ -305,7 +305,7 @@ def train(
     Args:
         config: every option of the run.
         envs: what `socialai_dsl.make_vec(..., autoreset_mode="SameStep")` returns, not yet reset.
-        run_dir: directory of the run, made if missing.
+        run_dir: directory of the run, made if missing; only a resumed one holds a run already.
         progress: called after every update with its row, as in `metrics.jsonl`.
         resume: continue the run in `run_dir`.
         tracker: sends the figures elsewhere as well.
@@ -313,12 +313,16 @@ def train(
         stop: asked before every update; where it is true, training ends early, and a resumed run goes on from there.
 
     Raises:
-        ValueError: configuration and environments do not fit, or the tracker cannot begin.
+        ValueError: configuration and environments do not fit, something of the user's returned what it must not, the
+            directory holds another run, or the tracker cannot begin.
         CheckpointError: there is nothing to resume, or it is damaged or of another run.
         TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint is
             intact.
     """
+    run_dir = Path(run_dir)
     session = Session.start(config, envs, program)
+    if not resume and any((run_dir / checkpoints.FOLDER).glob("*.safetensors")):
+        raise ValueError(f"run_dir: {run_dir} holds a run already; resume it, or choose another folder")
     if resume:
         session.resume(run_dir)
     with (

@@ -164,7 +164,7 @@ def _step(
     if session.bonus is not None:
         found = session.bonus.step(envs, observation["image"], ended)
         paid = require_array("bonus: the result of step", found, ended.shape, np.float64)
-        require_finite("what the bonus paid", torch.from_numpy(paid))
+        require_finite("what the bonus paid", torch.from_numpy(paid).float())
         tally.bonus += float(paid.sum()) / config.frames_per_update
         reward = reward + paid
     return reward.astype(np.float32), ended, bootstrap

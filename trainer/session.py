@@ -115,8 +115,7 @@ class Session:
             ValueError: the environments do not fit the configuration or the program, or are not of the form the
                 trainer learns.
         """
-        if config.frames < 1:
-            raise ValueError(f"frames: got {config.frames}, expected at least 1")
+        _check_options(config)
         _check_form(config, envs)
         if program is not None:
             _check_alike(program, envs.program)
@@ -155,10 +154,9 @@ class Session:
             for key, value in self.optimizer.state.get(parameter, {}).items():
                 tensors[f"adam.{key}.{name}"] = value
         for name, part in self._parts_in_json():
-            tensors[name] = _as_tensor(json.dumps(part.state()).encode())
+            tensors[name] = _json_tensor(name, part.state())
         if self.bonus is not None:
-            for name, array in self.bonus.state().items():
-                tensors[f"bonus.{name}"] = torch.from_numpy(np.asarray(array))
+            tensors |= _array_tensors("bonus", self.bonus.state())
         for name, value in vars(self.state).items():
             tensors[f"state.{name}"] = torch.as_tensor(value)
         tensors["step_scale"] = torch.tensor(self.step_scale, dtype=torch.float64)
@@ -288,6 +286,19 @@ def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
         raise TrainingStopped(f"{where}: {reason}; {kept}") from error
 
 
+def _check_options(config: RunConfig) -> None:
+    """Refuse options that are good for other runs than a training, or not on this machine."""
+    if not config.trains:
+        raise ValueError(f"agent: got {config.agent}, expected ppo, which is the agent that is trained")
+    if config.frames < 1:
+        raise ValueError(f"frames: got {config.frames}, expected at least 1")
+    try:
+        torch.zeros(1).to(config.device).cpu()
+    except (RuntimeError, AssertionError) as error:  # as PyTorch reports devices that there are not
+        reason = str(error).partition("\n")[0]
+        raise ValueError(f"device: got {config.device}, expected cpu or cuda: {reason}") from error
+
+
 def _check_form(config: RunConfig, envs: Any) -> None:
     """Refuse environments that are not a vector of the configured number, restarted as the trainer expects."""
     needed = 'expected socialai_dsl.make_vec(..., autoreset_mode="SameStep")'
@@ -310,6 +321,20 @@ def _check_alike(program: Any, played: Any) -> None:
                 f"guide: {played.name} with its script has other {name} than without it: {strange}; let both have "
                 "the same, or train without a guide"
             )
+
+
+def _json_tensor(part: str, state: Any) -> Tensor:
+    try:
+        return _as_tensor(json.dumps(state).encode())
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{part}: state returned what is no JSON data: {error}") from error
+
+
+def _array_tensors(part: str, state: Any) -> dict[str, Tensor]:
+    try:
+        return {f"{part}.{name}": torch.from_numpy(np.asarray(array)) for name, array in state.items()}
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"{part}: state returned what are no arrays by name: {error}") from error
 
 
 def _as_tensor(data: bytes) -> Tensor:

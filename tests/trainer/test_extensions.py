@@ -14,7 +14,8 @@ from trainer.bonus import build_bonus
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.curricula import Leaves, build_curriculum
-from trainer.guides import build_guide
+from trainer.errors import TrainingStopped
+from trainer.guides import Lead, build_guide
 from trainer.nets import NetSpec, build_net
 from trainer.play import CheckpointPolicy
 from trainer.ppo import train
@@ -227,13 +228,119 @@ def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
     assert policy.act(there.reset(seed=0)[0]).shape == (4, 4)
 
 
-class _Short:
-    def step(self, *_: Any) -> Any:
-        return np.zeros(3)
+def returning(method: str, result: Any) -> Any:
+    """One whose method returns this, or what this makes of the number of environments."""
+    return type("Mine", (), {method: lambda self, envs, *rest: result(8) if callable(result) else result})()
 
 
-def test_arrays_of_another_shape_are_refused_by_name(small_config: Any) -> None:
+def lead(**changes: Any) -> Lead:
+    given = {"actions": np.zeros((8, 4), np.int64), "led": np.ones(8, np.bool_), "weights": np.ones(8)}
+    return Lead(**(given | changes))
+
+
+@pytest.mark.parametrize(
+    ("result", "message"),
+    [
+        (lambda n: np.zeros(n - 5), r"got the shape \(3,\), expected \(8,\)"),
+        (0.5, r"got the shape \(\), expected \(8,\)"),
+        (lambda n: np.zeros((n, 1)), r"got the shape \(8, 1\), expected \(8,\)"),
+        (None, "got the shape"),
+        (lambda n: ["1"] * n, "got the type <U1, expected float64"),
+        (lambda n: np.zeros(n, complex), "got the type complex128, expected float64"),
+        ([[1], [1, 2]], "got what is no array"),
+        (lambda n: np.full(n, np.nan), "what the bonus paid is not a finite number"),
+        (lambda n: np.full(n, -np.inf), "what the bonus paid is not a finite number"),
+        (lambda n: np.full(n, 1e300), "what the bonus paid is not a finite number"),
+    ],
+)
+def test_what_a_bonus_must_not_pay_is_refused_by_name(result: Any, message: str, small_config: Any) -> None:
     session = Session.start(small_config(), EchoEnvs(8))
-    session.bonus = _Short()  # type: ignore[assignment]
-    with pytest.raises(ValueError, match=r"bonus: the result of step: got the shape \(3,\), expected \(8,\)"):
+    session.bonus = returning("step", result)
+    stops = message.startswith("what the bonus")
+    with pytest.raises(
+        TrainingStopped if stops else ValueError,
+        match=message if stops else f"bonus: the result of step: {message}",
+    ):
         collect(session)
+
+
+@pytest.mark.parametrize(
+    ("result", "message"),
+    [
+        (
+            lead(actions=np.full((8, 4), 4)),
+            r"actions of lead: got \[4, 4, 4, 4\] for environment 0, expected wh",
+        ),
+        (lead(actions=np.full((8, 4), -1)), r"actions of lead: got \[-1, -1, -1, -1\] for environment 0"),
+        (
+            lead(actions=np.eye(8, 4, -3, np.int64) * 2),
+            r"actions of lead: got \[0, 2, 0, 0\] for environment 4",
+        ),
+        (lead(actions=np.zeros((8, 4))), "actions of lead: got the type float64, expected int64"),
+        (lead(actions=np.zeros((8, 3), int)), r"actions of lead: got the shape \(8, 3\), expected \(8, 4\)"),
+        (lead(actions=None), "actions of lead: got the shape"),
+        (lead(led=np.ones(8, int)), "led of lead: got the type int64, expected bool"),
+        (lead(led=True), r"led of lead: got the shape \(\), expected \(8,\)"),
+        (lead(weights=-np.ones(8)), "weights of lead: got -1, expected at least 0"),
+        (lead(weights=np.ones((8, 1))), r"weights of lead: got the shape \(8, 1\), expected \(8,\)"),
+        (lead(weights=np.full(8, np.nan)), "a weight that the guide's lead returned is not a finite number"),
+        (np.zeros((8, 4), int), "lead returned ndarray, expected Lead"),
+        (None, "lead returned NoneType, expected Lead"),
+    ],
+)
+def test_what_a_guide_must_not_do_is_refused_by_name(result: Any, message: str, small_config: Any) -> None:
+    session = Session.start(small_config(), EchoEnvs(8))
+    session.guide = returning("lead", result)
+    stops = message.startswith("a weight")
+    with pytest.raises(
+        TrainingStopped if stops else ValueError, match=message if stops else f"guide: {message}"
+    ):
+        collect(session)
+
+
+def test_what_a_guide_returns_may_be_of_any_type_that_loses_nothing(small_config: Any) -> None:
+    for given in (lead(actions=np.zeros((8, 4), np.uint8)), lead(led=[True] * 8, weights=[1] * 8)):
+        session = Session.start(small_config(), EchoEnvs(8))
+        session.guide = returning("lead", given)
+        rollout = collect(session)
+        assert rollout.lead is not None
+        assert rollout.lead.led.all()
+        assert [part.dtype for part in rollout.lead] == [torch.int64, torch.bool, torch.float32]
+
+
+@pytest.mark.parametrize(
+    ("part", "wrong", "message"),
+    [
+        ("perceive", lambda *_: torch.zeros(3, 128), r"the result of perceive: got the shape \(3, 128\)"),
+        ("heads", lambda x: (x, x[:, 0]), r"logits of heads: got the shape \(8, 128\), expected \(8, 12\)"),
+        (
+            "heads",
+            lambda x: (x[:, :12], x[:, :1]),
+            r"values of heads: got the shape \(8, 1\), expected \(8,\)",
+        ),
+    ],
+)
+def test_what_a_network_must_not_return_is_refused_by_name(
+    part: str, wrong: Any, message: str, small_config: Any
+) -> None:
+    session = Session.start(small_config(), EchoEnvs(8))
+    owner, name = (session.actor.net.heads, "forward") if part == "heads" else (session.actor.net, "perceive")
+    setattr(owner, name, wrong)
+    with pytest.raises(ValueError, match=f"net: {message}"):
+        collect(session)
+
+
+@pytest.mark.parametrize("state", [None, 3, {"a": object()}, {"a": [[1], [1, 2]]}])
+def test_a_state_that_cannot_be_kept_is_refused_before_the_first_frame(
+    state: Any, tmp_path: Path, small_config: Any
+) -> None:
+    session = Session.start(small_config(), EchoEnvs(8))
+    session.bonus = returning("state", None)
+    session.bonus.state = lambda: state  # type: ignore[union-attr]
+    with pytest.raises(ValueError, match="bonus: state returned what are no arrays by name"):
+        session.save(tmp_path)
+    session.bonus, session.guide = None, returning("state", None)
+    session.guide.state = lambda: {"a": object()}  # type: ignore[union-attr]
+    with pytest.raises(ValueError, match="guide: state returned what is no JSON data"):
+        session.save(tmp_path)
+    assert not list(tmp_path.rglob("*.safetensors"))

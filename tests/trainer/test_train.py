@@ -1,6 +1,7 @@
 """Training learns, resumes exactly, and stops cleanly with its last good checkpoint."""
 
 import json
+import re
 import resource
 import signal
 import subprocess
@@ -8,18 +9,22 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
+import socialai_dsl
 from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import ppo as training
 from trainer.checkpoint import read
 from trainer.config import RunConfig
+from trainer.curricula import Tutor
 from trainer.errors import CheckpointError, TrainingStopped
 from trainer.play import CheckpointPolicy
 from trainer.ppo import train
@@ -153,6 +158,76 @@ def test_progress_and_metrics_are_complete(tmp_path: Path, small_config: Any) ->
     assert row["timeouts"] == pytest.approx(row["outcomes"]["time_out"])
     assert row["rules"]["speaks"] > 0
     assert list(tmp_path.glob("events.out.tfevents.*"))
+
+
+def real(scenario: str, **options: Any) -> Any:
+    return socialai_dsl.make_vec(scenario, num_envs=8, **options)
+
+
+MODE = 'envs: got the autoreset mode {}, expected socialai_dsl.make_vec(..., autoreset_mode="SameStep")'
+FORM = 'envs: got {}, expected socialai_dsl.make_vec(..., autoreset_mode="SameStep")'
+
+
+@pytest.mark.parametrize(
+    ("envs", "options", "message"),
+    [
+        (lambda: EchoEnvs(8, mode=AutoresetMode.NEXT_STEP), {}, MODE.format("NextStep")),
+        (lambda: EchoEnvs(8, mode=AutoresetMode.DISABLED), {}, MODE.format("Disabled")),
+        (lambda: EchoEnvs(8, mode=None), {}, MODE.format("None")),
+        (lambda: real("dance"), {}, MODE.format("NextStep")),
+        (
+            lambda: real("social_env", autoreset_mode="Disabled"),
+            {"curriculum": "even"},
+            MODE.format("Disabled"),
+        ),
+        (
+            lambda: real("dance", autoreset_mode="NextStep"),
+            {"bootstrap_timeouts": True},
+            MODE.format("NextStep"),
+        ),
+        (lambda: EchoEnvs(7), {}, "envs: got 7 environments, expected envs = 8"),
+        (lambda: socialai_dsl.make("dance"), {}, FORM.format("ScenarioEnv")),
+        (lambda: gym.make_vec("CartPole-v1", num_envs=8), {}, FORM.format("CartPoleVectorEnv")),
+        (lambda: None, {}, FORM.format("NoneType")),
+        (lambda: with_actions([4, 3, 2, 4]), {}, "action space: got MultiDiscrete([4 3 2 4]), expected"),
+        (lambda: with_actions([4, 2, 3, 4]), {}, "action space: got MultiDiscrete([4 2 3 4]), expected (te"),
+        (lambda: EchoEnvs(8), {"frames": 0}, "frames: got 0, expected at least 1"),
+        (lambda: EchoEnvs(8), {"agent": "random"}, "agent: got random, expected ppo"),
+        (lambda: EchoEnvs(8), {"device": "tpu9"}, "device: got tpu9, expected cpu or cuda: "),
+        (lambda: EchoEnvs(8), {"device": "meta"}, "device: got meta, expected cpu or cuda: "),
+        (lambda: EchoEnvs(8), {"curriculum": "even"}, "curriculum: got a scenario, expected a suite"),
+    ],
+)
+def test_what_the_trainer_does_not_train_is_refused_in_one_sentence(
+    envs: Any, options: dict[str, Any], message: str, tmp_path: Path, small_config: Any
+) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)) as caught:
+        train(small_config(**options), envs(), tmp_path / "run")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def with_actions(sizes: list[int]) -> EchoEnvs:
+    envs = EchoEnvs(8)
+    envs.single_action_space = gym.spaces.MultiDiscrete(sizes)
+    return envs
+
+
+@pytest.mark.parametrize("weights", [[1], [0.5] * 6, [-1] * 6, [0] * 6, None, ["1"] * 6, [float("nan")] * 6])
+def test_weights_of_a_curriculum_that_are_none_are_refused_by_name(weights: Any) -> None:
+    curriculum = SimpleNamespace(weights=lambda: weights)
+    with pytest.raises(ValueError, match=r"^curriculum: .*got.* expected .*(whole numbers|integers)"):
+        Tutor(curriculum, real("social_env", autoreset_mode="SameStep"))  # type: ignore[arg-type]
+
+
+def test_a_run_is_not_written_over_another(tmp_path: Path, small_config: Any) -> None:
+    train(small_config(), EchoEnvs(8), str(tmp_path))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(
+        ValueError, match=f"run_dir: {tmp_path} holds a run already; resume it, or choose ano"
+    ):
+        train(small_config(seed=1), EchoEnvs(8), tmp_path)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 class Poisoned(EchoEnvs):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import index
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -82,7 +83,13 @@ class Tutor:
         self._playing = self._envs.member_ids()
 
     def _choose(self) -> None:
-        weights = [int(weight) for weight in self.curriculum.weights()]
-        if weights != self._weights:
-            self._envs.set_member_weights(weights)
-            self._weights = weights
+        given = self.curriculum.weights()
+        try:
+            weights = [index(weight) for weight in given]
+            if weights != self._weights:
+                self._envs.set_member_weights(weights)
+                self._weights = weights
+        except TypeError as error:
+            raise ValueError(f"curriculum: got the weights {given}, expected whole numbers") from error
+        except ValueError as error:
+            raise ValueError(f"curriculum: {error}") from error

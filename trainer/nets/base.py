@@ -61,9 +61,14 @@ class NetSpec:
                 f"action space: got {actions}, expected MultiDiscrete([bodies, 2, templates, words, ...])"
             )
         observations = getattr(envs, "single_observation_space", envs.observation_space)
-        parts = observations if isinstance(observations, spaces.Dict) else {}
+        parts = observations.spaces if isinstance(observations, spaces.Dict) else {}
         image, tokens = parts.get("image"), parts.get("tokens")
-        if not (_is_box(image, 3, np.uint8) and _is_box(tokens, 1, np.int16)):
+        if not (
+            isinstance(image, spaces.Box)
+            and isinstance(tokens, spaces.Box)
+            and (len(image.shape), image.dtype, len(tokens.shape), tokens.dtype)
+            == (3, np.dtype(np.uint8), 1, np.dtype(np.int16))
+        ):
             raise ValueError(
                 f"observation space: got {observations}, expected Dict(image=Box(H, W, C) of uint8, tokens=Box(L) of "
                 "int16)"
@@ -75,11 +80,8 @@ class NetSpec:
             raise ValueError(
                 f"action space: got {actions}, expected (templates, slots) = {shape} as in the program"
             )
-        return cls(tuple(actions.nvec.tolist()), image.shape, tuple(high.tolist()), words, used)
-
-
-def _is_box(space: Any, dimensions: int, dtype: type[np.generic]) -> bool:
-    return isinstance(space, spaces.Box) and len(space.shape) == dimensions and space.dtype == dtype
+        height, width, channels = image.shape
+        return cls(tuple(actions.nvec.tolist()), (height, width, channels), tuple(high.tolist()), words, used)
 
 
 class Heads(nn.Module):
