@@ -221,7 +221,7 @@ def test_a_guide_that_does_what_cannot_be_done_is_told_so(small_config: Any, tmp
     )
     scenario = str(tmp_path / "any.yaml")
     collect(Session.start(guided(small_config, guide="mine:Guide", scenario=scenario), envs()))
-    with pytest.raises(ValueError, match=r"guide: got the action \[99, 99, 99, 99\] in row 0, expected"):
+    with pytest.raises(ValueError, match=r"actions of lead: got \[99, 99, 99, 99\] for environment 0"):
         collect(Session.start(guided(small_config, guide="wrong:Guide", scenario=scenario), envs()))
 
 
