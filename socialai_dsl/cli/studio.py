@@ -9,7 +9,7 @@ import webbrowser
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.arguments import natural
+from socialai_dsl.cli.arguments import at_once, natural
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import SUFFIXES
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--windows",
-        type=int,
+        type=at_once,
         default=MOST_WINDOWS,
         metavar="N",
         help=f"how many windows may be open at once; each has processes of its own (default: {MOST_WINDOWS})",
@@ -62,8 +62,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.studio.address import Address, remember, remembered
     from socialai_dsl.studio.server import LARGEST_FRAME, Studio
 
-    if arguments.windows < 1:
-        raise UsageError(f"--windows: got {arguments.windows}, expected at least 1")
     root, opened = _opened(arguments.path)
     former = remembered(root, arguments.host)
     listening = _listen(arguments.host, arguments.port, former.port if former else None)

@@ -222,7 +222,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         * `test_episode`, an int, without a seed: plays this episode of a domain that no seed reaches; 0 to 499 are the
           fixed test set.
         * `index`, an int, with a seed: plays as environment `index` of a vector environment with this seed.
-        * `reset_mask`, one boolean: False leaves the episode as it is; not in the first reset.
+        * `reset_mask`, one boolean: False leaves the episode as it is.
 
         Args:
             seed: starts episode 0 of this seed. Without it the next episode follows; the first reset then draws a seed
@@ -239,7 +239,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         seed = None if seed is None else whole_number("seed", seed, 0, MAX_SEED)
         self._table.reset(seed, options)
         super().reset(seed=seed)
-        self._ended = bool(self._registers[Register.ENDED])  # still so where `reset_mask` is False
+        # Still so where `reset_mask` is False.
+        self._ended = not self._table.all_begun or bool(self._registers[Register.ENDED])
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
             self.render()

@@ -57,13 +57,18 @@ LAST_EPISODE = (1 << 32) - 1
 
 
 def choose_episodes(
-    keys: NDArray[np.uint64], chosen: NDArray[np.bool_], seed: Any, options: Mapping[str, Any], fresh: bool
+    keys: NDArray[np.uint64],
+    chosen: NDArray[np.bool_],
+    seed: Any,
+    options: Mapping[str, Any],
+    fresh: NDArray[np.bool_],
 ) -> None:
     """Set seed, index and episode in the rows, uint64 (E, Key.WORDS), that are chosen, bool (E,).
 
     `test_episode` names episodes of a domain of keys that no seed reaches; 0 to 499 are the fixed test set.
     One seed gives environment i (seed, i); a list gives it (seeds[i], 0); both start at episode 0. Without a seed, or
-    where the list has None, the next episode follows, or, in a fresh batch, a seed is drawn from the operating system.
+    where the list has None, the next episode follows, or, in a `fresh` row, bool (E,), which has had none, a seed is
+    drawn from the operating system.
 
     Raises:
         ValueError: an option is not what was expected, or says nothing beside another.
@@ -85,12 +90,12 @@ def choose_episodes(
         raise ValueError(
             f"options['index']: got {index!r} without a seed; expected a seed of which it is the index"
         )
-    if seed is None and fresh:
+    if seed is None and fresh.all():
         seed = secrets.randbelow(MAX_SEED + 1)
     given_seeds = [None] * len(keys) if seed is None else seed
     seeds = each("seed", given_seeds, len(keys), MAX_SEED, or_none=True)
-    if fresh:
-        seeds = [secrets.randbelow(MAX_SEED + 1) if number is None else number for number in seeds]
+    for row in np.flatnonzero(fresh):
+        seeds[row] = secrets.randbelow(MAX_SEED + 1) if seeds[row] is None else seeds[row]
     has_seed = np.array([number is not None for number in seeds])
     keys[chosen & ~has_seed, Key.EPISODE] += np.uint64(1)
     begun = np.flatnonzero(chosen & has_seed)
@@ -122,9 +127,14 @@ def _numbers_of_texts(lines: Sequence[str]) -> NDArray[np.uint64]:
     return np.array([first[text] for text in lines], np.uint64)
 
 
-def too_early(call: str) -> ValueError:
-    """What is raised where a call needs an episode."""
-    return ValueError(f"{call}: got a call before the first reset(); expected reset() first")
+def too_early(call: str, fresh: NDArray[np.bool_]) -> ValueError:
+    """What is raised where a call needs an episode in every row, and some are `fresh`, bool (E,)."""
+    if fresh.all():
+        return ValueError(f"{call}: got a call before the first reset(); expected reset() first")
+    rows = np.flatnonzero(fresh).tolist()
+    return ValueError(
+        f"{call}: got environments that were never reset, {rows[:10]}; expected reset() of all first"
+    )
 
 
 class Start(NamedTuple):
@@ -160,7 +170,8 @@ class Table(Copied):
         self.rows = rows
         self.channels = len(self.merged.channels)
         self._find_buffers()
-        self.fresh = True
+        self.fresh = np.ones(self.rows, np.bool_)
+        self.all_begun = False
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
         self._texts = [_numbers_of_texts(program.lines) for program in self.programs]
         # Of each pool: what the suite calls its members; None if it is a scenario that plays alone.
@@ -197,7 +208,8 @@ class Table(Copied):
         pins, rows = self._pins(layout, keys, chosen)
         # Nothing has changed so far, should something be wrong with what was given.
         self.state.keys[:] = keys
-        self.fresh = False
+        self.fresh = self.fresh & ~chosen
+        self.all_begun = not self.fresh.any()
         ports = self.batch.ports
         ports.chosen[:] = chosen
         ports.layout[:] = rows
@@ -211,8 +223,7 @@ class Table(Copied):
 
     def step(self, task: Task, actions: Any) -> int:
         """Step all rows, int64 (E, 3 + slots); how many episodes ended. Raises ValueError for a bad action."""
-        if self.fresh:
-            raise too_early("step")
+        self.look("step")
         try:
             given = np.asarray(actions)
         except ValueError:  # rows of different lengths
@@ -263,11 +274,6 @@ class Table(Copied):
         given = np.asarray(mask)
         if given.shape != (self.rows,) or given.dtype != np.bool_:
             raise ValueError(f"options['reset_mask']: got {mask!r}; expected {self.rows} booleans")
-        if self.fresh and not given.all():
-            raise ValueError(
-                f"options['reset_mask']: got {mask!r} in the first reset; expected all to be True, since no "
-                "environment has an episode yet"
-            )
         return given
 
     def _pins(
@@ -364,8 +370,8 @@ class Table(Copied):
 
     def look(self, what: str) -> None:
         """Raise ValueError if there is nothing to be seen yet."""
-        if self.fresh:
-            raise too_early(what)
+        if not self.all_begun:
+            raise too_early(what, self.fresh)
 
     def start(self, row: int) -> Start:
         """The moment at which a row is, copied."""
@@ -498,7 +504,8 @@ class Table(Copied):
         self._check(read)
         for name, array in read.items():
             arrays[name][...] = array
-        self.fresh = False
+        self.fresh = np.zeros(self.rows, np.bool_)
+        self.all_begun = True
         if self.batch.more:
             self.image[...] = joined(self.state.image, self.state.extra, self.channels)
 

@@ -134,7 +134,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
 
         Options:
 
-        * `reset_mask`, bool (E,): the environments that restart; without it, and in the first reset, all of them.
+        * `reset_mask`, bool (E,): the environments that restart; without it all of them.
         * `test_episode`, an int or a list of E, without a seed: plays these episodes of a domain that no seed reaches;
           0 to 499 are the fixed test set.
         * `layout`, a mapping or a list of E with None for a drawn room: starts from a known room.

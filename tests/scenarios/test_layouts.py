@@ -139,16 +139,27 @@ KNOWN = {
         1,
     ),
     "a switch pressed too early": Known("showme", SHOW, ["toggle", *OUT], "failure", 8),
-    "a peer that is gone": Known("showme", also(SHOW, jim={"gone": True}), ["toggle", *OUT], "success", 8),
+    "a peer that is gone": Known(
+        "showme", also(SHOW, jim={"gone": True, "at": None}), ["toggle", *OUT], "success", 8
+    ),
     "a switch that is pressed": Known(
         "showme+as_coded",
-        also(SHOW, jim={"gone": True}, switches=[{"state": "pressed"}], agent={"at": [1, 1], "facing": "up"}),
+        also(
+            SHOW,
+            jim={"gone": True, "at": None},
+            switches=[{"state": "pressed"}],
+            agent={"at": [1, 1], "facing": "up"},
+        ),
         ["toggle", "forward"],
         "success",
         2,
     ),
     "another switch": Known(
-        "showme", also(SHOW, jim={"gone": True}, let={"correct": "switches[2]"}), ["toggle", *OUT], None, 8
+        "showme",
+        also(SHOW, jim={"gone": True, "at": None}, let={"correct": "switches[2]"}),
+        ["toggle", *OUT],
+        None,
+        8,
     ),
     "the end of the light": Known("showme_no_social", also(ALONE, t=10), ["toggle", *OUT], "success", 18),
     "before its end": Known("showme_no_social", also(ALONE, t=1), ["toggle", *OUT], None, 9),
