@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from socialai_dsl.program import (
     Program,
     TypeColumn,
 )
+from socialai_dsl.widths import MOST_WORDS, WHOLE_REGISTER
 
 Words = np.ndarray
 
@@ -176,3 +178,47 @@ def test_mutants_are_refused(name: str, program: Program, answering: Program) ->
     whole = answering if name.startswith("an answer") else program
     with pytest.raises(InvalidProgramError, match="refused"):
         verify(mutated(whole, MUTANTS[name]))
+
+
+@pytest.mark.parametrize("which", ["low", "high"])
+def test_what_no_register_holds_is_refused(which: str, program: Program) -> None:
+    """However wide its range is said to be."""
+    least, greatest = WHOLE_REGISTER
+    ends = {"low": (least - 1, 0), "high": (0, greatest + 1)}[which]
+    first, *others = program.registers
+    wide = replace(first, low=ends[0], high=ends[1])
+    with pytest.raises(InvalidProgramError, match="which no register does"):
+        verify(replace(program, registers=(wide, *others)))
+
+
+def test_more_words_than_tokens_tell_apart_are_refused(program: Program) -> None:
+    many = tuple(f"word{i}" for i in range(MOST_WORDS + 1))
+    with pytest.raises(InvalidProgramError, match="more words than tokens"):
+        verify(replace(program, vocabulary=many))
+
+
+def test_a_reward_is_paid_once_a_step(tmp_path: Path) -> None:
+    """So that what a step pays is at most what all rules pay, which a register holds."""
+    path = tmp_path / "paid.yaml"
+    path.write_text(PAID, encoding="utf-8")
+    paid = sd.compile(sd.load(path))
+    frame = paid.header(Header.STATE_AT)
+
+    def elsewhere(words: Words, program: Program) -> None:
+        words[frame] = program.header(Header.RULES_PC)
+
+    verify(paid)
+    with pytest.raises(InvalidProgramError, match="more than once a step"):
+        verify(mutated(paid, elsewhere))
+
+
+PAID = """\
+scenario: paid
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 6}
+objects: {door: {type: door, place: wall(top)}}
+frames: {talk: {states: {s: {then: [{hears: any, say: Hi}]}}}}
+cast: {agent: {}, ann: {frame: talk}}
+rules: [{when: t > 3, reward: 5}]
+outcome: [{success: agent.at(door)}]
+"""
