@@ -30,7 +30,7 @@ def compare(folder: Path, seed: int, episodes: int) -> int:
 
 
 @pytest.mark.parametrize(
-    "first", one_in(3, range(0, 60, 10), "plays random scenarios on the slow interpreter")
+    "first", one_in(3, range(0, 80, 10), "plays random scenarios on the slow interpreter")
 )
 def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
     steps = [compare(tmp_path, seed, episodes=1) for seed in range(first, first + 10)]
@@ -182,7 +182,7 @@ SPOKEN_OF = (
 
 
 def test_random_scenarios_speak_of_most_of_the_language() -> None:
-    texts = [write(seed) for seed in range(60)]
+    texts = [write(seed) for seed in range(80)]
     missing = [word for word in SPOKEN_OF if not any(word in text for text in texts)]
     assert not missing
     assert all(re.match(r"scenario: random_\d+\n", text) for text in texts)

@@ -290,8 +290,6 @@ def _check_options(config: RunConfig) -> None:
     """Refuse options that are good for other runs than a training, or not on this machine."""
     if not config.trains:
         raise ValueError(f"agent: got {config.agent}, expected ppo, which is the agent that is trained")
-    if config.frames < 1:
-        raise ValueError(f"frames: got {config.frames}, expected at least 1")
     try:
         torch.zeros(1).to(config.device).cpu()
     except (RuntimeError, AssertionError) as error:  # as PyTorch reports devices that there are not

@@ -78,7 +78,7 @@ def test_the_report_is_json(scenario: str, capsys: Capture) -> None:
     (memory,) = report["memory"]
     length = socialai_dsl.make(scenario).observation_space["tokens"].shape[0]  # type: ignore[index]
     assert memory["observation"] == 7 * 7 * 4 + 2 * length
-    assert memory["call"] == 4 * 8 + 8 + 3 * 1 + 2 + 1
+    assert memory["call"] == 4 * 8 + 8 + 3 * 1 + 4 + 1
 
 
 def test_wrong_usage(capsys: Capture) -> None:

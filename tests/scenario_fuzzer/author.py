@@ -315,6 +315,7 @@ class _Author:
             low, high = self.around_the_edge()
             made["code"] = self.rng.choice((f"pick({low}..{high})", f"pick({low} | {high})"))
             self.declared.wide.append("code")
+            self.declared.keyed.append("code")
         for thing in self.declared.several:
             if self.often(0.6):
                 name = f"the_{thing.name}"
@@ -365,6 +366,7 @@ class _Author:
             made["hoard"] = {"start": self.rng.choice((0, low, high, f"pick({low} | 0)"))}
             if self.often(0.5):
                 made["hoard"]["range"] = f"{min(low, 0)}..{max(high, 0)}"
+                self.declared.keyed.append("hoard")
             made["vault"] = {"start": 0, "for": f"{low}..{high}", "range": f"{min(low, -3)}..{max(high, 3)}"}
             self.declared.wide.append("hoard")
             self.declared.vault = (low, high)

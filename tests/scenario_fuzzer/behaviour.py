@@ -159,7 +159,7 @@ class Behaviour:
         }
         if self.declared.edge:
             found["hoard"] = lambda: self.large(where)
-            found[f"vault({self.phrases.wide(where)})"] = lambda: self.large(where)
+            found[f"vault({self.rng.choice(self.declared.keyed)})"] = lambda: self.large(where)
         for row in [*self.declared.rows, *(where.frame.rows if where.frame else [])]:
             if row.keys is not None and self.often(0.25):
                 found |= self.of_those(row, where)

@@ -84,6 +84,7 @@ class Declared:
         0,
         0,
     )  # the least and greatest key of a register for each number around the edge
+    keyed: list[str] = field(default_factory=list)  # those of the next that may be such a key
     wide: list[str] = field(default_factory=list)  # registers of the world and lets that may come to it
     registers: list[str] = field(default_factory=list)  # those of them that rules can set
     rows: list[Row] = field(default_factory=list)  # registers of the world for each of a group

@@ -278,9 +278,7 @@ class Phrases:
             ]
         options += self.kept("number", where)
         if known.wide:
-            options += [
-                lambda: f"({self.wide(where)} {rng.choice(('//', '%'))} {rng.choice((3, known.edge))})"
-            ]
+            options += [lambda: f"({self.wide(where)} {rng.choice(('% 3', f'// {known.edge}'))})"]
         if known.nouns_are_numbers:
             options += ["noun", "noun"] if where.noun else []
             options += ["agent.noun"] if not where.reset else []

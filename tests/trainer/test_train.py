@@ -191,7 +191,6 @@ FORM = 'envs: got {}, expected socialai_dsl.make_vec(..., autoreset_mode="SameSt
         (lambda: None, {}, FORM.format("NoneType")),
         (lambda: with_actions([4, 3, 2, 4]), {}, "action space: got MultiDiscrete([4 3 2 4]), expected"),
         (lambda: with_actions([4, 2, 3, 4]), {}, "action space: got MultiDiscrete([4 2 3 4]), expected (te"),
-        (lambda: EchoEnvs(8), {"frames": 0}, "frames: got 0, expected at least 1"),
         (lambda: EchoEnvs(8), {"agent": "random"}, "agent: got random, expected ppo"),
         (lambda: EchoEnvs(8), {"device": "tpu9"}, "device: got tpu9, expected cpu or cuda: "),
         (lambda: EchoEnvs(8), {"device": "meta"}, "device: got meta, expected cpu or cuda: "),

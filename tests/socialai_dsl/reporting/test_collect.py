@@ -57,6 +57,7 @@ def test_a_run_whose_worker_is_gone_has_stopped(folder: Path) -> None:
     assert runs(folder)[0].state == "running"
     with hold(run, "worker"):
         assert runs(folder)[0].state == "running"
+    (run / "worker.lock").touch()  # as a worker that is killed leaves it
     assert runs(folder)[0].state == "stopped"
 
 
