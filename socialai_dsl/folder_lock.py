@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import json
 import os
 import socket
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,6 +16,9 @@ from pathlib import Path
 from typing import Final
 
 from filelock import FileLock, Timeout
+
+if sys.platform != "win32":
+    import fcntl
 
 _SECONDS_TO_NAME: Final = 1.0
 """How long a process that has the lock may take until it has written its name."""
@@ -75,8 +78,8 @@ def hold(folder: Path, name: str, wait: float = 0.0) -> Iterator[None]:
         try:
             yield
         finally:
-            owner.unlink(missing_ok=True)
             os.close(descriptor)
+            owner.unlink(missing_ok=True)
     finally:
         # filelock looks whether what it has locked is still there, so whoever waits takes a new file.
         Path(lock.lock_file).unlink(missing_ok=True)
@@ -84,18 +87,29 @@ def hold(folder: Path, name: str, wait: float = 0.0) -> Iterator[None]:
 
 
 def holder(folder: Path, name: str) -> Holder | None:
-    """The process that writes a folder; None if there is none. This takes no lock that a writer needs."""
+    """The process that writes a folder; None if there is none. This takes no lock that a writer needs.
+
+    On Windows, whose locks cannot be looked at, a process that was killed is named until the next one writes.
+    """
     try:
         descriptor = os.open(folder / f"{name}.owner", os.O_RDONLY)
     except OSError:
         return None
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return None  # whoever wrote it is gone
-    except OSError:
-        return _read(descriptor)
+        return None if _is_left(descriptor) else _read(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _is_left(descriptor: int) -> bool:
+    """Whether the process that wrote an open file is gone."""
+    if sys.platform == "win32":
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _written(owner: Path) -> int:
@@ -103,13 +117,18 @@ def _written(owner: Path) -> int:
     own = owner.with_name(f".{owner.name}.{os.getpid()}-{time.monotonic_ns()}")
     descriptor = os.open(own, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno != errno.ENOSYS:  # a disk without locks: nobody can see that we are here
-                raise
+        if sys.platform != "win32":
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if error.errno != errno.ENOSYS:  # a disk without locks: nobody can see that we are here
+                    raise
         with contextlib.suppress(OSError):  # a full disk: the lock holds, without a name
             os.write(descriptor, json.dumps(vars(_ourselves())).encode())
+        if sys.platform == "win32":  # which moves no open file
+            os.close(descriptor)
+            own.replace(owner)
+            return os.open(owner, os.O_RDONLY)
         own.replace(owner)
     except BaseException:
         os.close(descriptor)
