@@ -45,14 +45,14 @@ class Shown(Protocol):
 
 
 def replay_page(traces: Sequence[Shown]) -> str:
-    """One HTML file with the episodes, which loads nothing from elsewhere; episodes without success come first.
+    """One HTML file with the episodes, which loads nothing from elsewhere; successes come first.
 
     Raises:
         ValueError: there is no episode.
     """
     if not traces:
         raise ValueError("traces: got none, expected at least one")
-    ordered = sorted(traces, key=lambda trace: trace.succeeded)
+    ordered = sorted(traces, key=lambda trace: not trace.succeeded)
     data = "[" + ",".join(trace.as_json() for trace in ordered) + "]"
     packed = base64.b64encode(gzip.compress(data.encode(), mtime=0)).decode()
     script, style = bundled("replay.js"), static_text("pages.css")
