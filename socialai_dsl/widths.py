@@ -1,7 +1,4 @@
-"""How wide each stored thing is. The checks refuse what an author writes that needs more, the verifier any program.
-
-Nothing else in the project spells such a bound.
-"""
+"""How wide registers, constants and tokens are: the checks refuse files that need more, the verifier programs."""
 
 from __future__ import annotations
 

@@ -242,9 +242,8 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
             parameter.grad = _sum(parameter, own)
         means, counts = Figures.pooled(found)
         require_finite("the loss", means[0])
-        steps.append(
-            Figures(means, counts / counts[0])
-        )  # by shares of its frames, so that minibatches count equally
+        # By shares of its frames, so that minibatches count equally.
+        steps.append(Figures(means, counts / counts[0]))
         norms.append(nn.utils.clip_grad_norm_(parameters, config.max_grad_norm))
         require_finite("a gradient", norms[-1])
         if config.target_kl is not None:

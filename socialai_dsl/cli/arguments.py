@@ -140,7 +140,7 @@ def identifier(text: str) -> str:
 
 
 def whole_number(text: str) -> int:
-    """A whole number whose bounds are somebody else's; `1_000` and `1,000` are 1000."""
+    """A whole number, whose bounds the caller checks; `1_000` and `1,000` are 1000."""
     try:
         return int(text.replace("_", "").replace(",", ""))
     except ValueError:

@@ -184,7 +184,7 @@ class CodeTable:
         return self._known[key]
 
 
-# -- registers: one row per environment -------------------------------------------------------------
+# -- registers: one row per environment ----------------------------------------------------------------------
 
 
 NOWHERE = CELL - 1

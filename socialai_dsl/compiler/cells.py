@@ -570,10 +570,11 @@ def _far(to: Emitter) -> int:
 
 
 _MASK_BITS = 19
-"""How many numbers a set in one operand can tell apart."""
+"""How many numbers a set in one operand tells apart; it has room for ten more."""
 _WORD_BITS = 63
 _MOST_NUMBERS = 1 << 12
 _MOST_KEYS = 1 << 16
+"""The most values of a key that are looked at one by one."""
 
 
 @dataclass(frozen=True)

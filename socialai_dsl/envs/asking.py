@@ -149,7 +149,7 @@ class _Looker:
 
     @property
     def _registers(self) -> NDArray[np.int32]:
-        """Those of the moment looked at, int16 (R,)."""
+        """Those of the moment looked at, int32 (R,)."""
         registers: NDArray[np.int32] = self._table.state.registers[0]
         return registers
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
-from reprlib import repr
+from reprlib import repr as shortened
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
@@ -186,7 +186,7 @@ def _prices(text: str | None) -> tuple[float, float] | None:
     except ValueError:
         prompt = completion = -1.0
     if not (0 <= prompt <= _MOST_SPENT and 0 <= completion <= _MOST_SPENT):
-        raise UsageError(f"--prices: got {repr(text)}, expected two amounts such as 0.15,0.60")
+        raise UsageError(f"--prices: got {shortened(text)}, expected two amounts such as 0.15,0.60")
     return prompt, completion
 
 
@@ -199,7 +199,7 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
     amount = 0.0 if match is None else float(match[1].replace(",", "").replace("_", ""))
     if match is None or not 0 < amount <= _MOST_SPENT:
         raise UsageError(
-            f"--budget: got {repr(text)}, expected an amount such as 200000 or 2.50usd, above 0 and at most "
+            f"--budget: got {shortened(text)}, expected an amount such as 200000 or 2.50usd, above 0 and at most "
             f"{_MOST_SPENT:g}"
         )
     if (match[2] or "").lower() != "usd":

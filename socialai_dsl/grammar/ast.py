@@ -408,6 +408,9 @@ def _parser() -> Lark:
 
 
 _DIGITS = 20
+"""Of a number at most; of thousands Python makes no number."""
+_CITED = 12
+"""Digits of a number that a message repeats."""
 
 
 @v_args(meta=True)
@@ -421,9 +424,9 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
         return node
 
     def number(self, meta: Any, items: list[Any]) -> Any:
-        # Of thousands of digits Python makes no number.
         if len(items[0]) > _DIGITS or int(items[0]) > LARGEST_NUMBER:
-            message = f"the number {items[0][:12]} is too large; numbers go up to {LARGEST_NUMBER:,}"
+            cited = items[0] if len(items[0]) <= _CITED else f"{items[0][:_CITED]}..."
+            message = f"the number {cited} is too large; numbers go up to {LARGEST_NUMBER:,}"
             raise ParseProblem("S004", message, meta.start_pos)
         return self._made(Number(int(items[0]), at=meta.start_pos))
 

@@ -187,7 +187,7 @@ def holds_expressions(annotation: Any) -> bool:
 
 
 def sections_of(model: type[BaseModel]) -> tuple[list[str], list[str]]:
-    """The keys of a file that it may lack and that are mappings, and those that are lists: empty as good as missing."""
+    """The sections that a file may leave out, empty by default: the mappings, then the lists."""
     mappings, lists = list[str](), list[str]()
     for name, field in model.model_fields.items():
         parts = list(branches(field.annotation))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from operator import itemgetter
@@ -16,6 +15,7 @@ from socialai_dsl.semantics import (
     behaviour,
     entities,
     groups,
+    hearing,
     object_facts,
     possible,
     rows,
@@ -37,6 +37,7 @@ from socialai_dsl.semantics.plans import (
 )
 from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.probes import probes
+from socialai_dsl.semantics.ranges import Ranges
 from socialai_dsl.semantics.resolve import ScenarioResolver
 from socialai_dsl.semantics.resolver import (
     INT,
@@ -45,7 +46,6 @@ from socialai_dsl.semantics.resolver import (
     Resolver,
     number_of_texts,
     texts_of,
-    words_of_values,
 )
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -63,12 +63,11 @@ from socialai_dsl.semantics.terms import (
     Line,
     Quantification,
     SitedTerm,
-    Term,
     Type,
 )
 from socialai_dsl.semantics.texts import words_in_order
 from socialai_dsl.source import DataPath, Node, Span
-from socialai_dsl.vocabulary import PRIMITIVES, composed, words
+from socialai_dsl.vocabulary import PRIMITIVES
 from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
@@ -223,193 +222,6 @@ def _values(drawn: Drawn) -> tuple[int, ...]:
     return tuple(found)
 
 
-# -- ranges of registers that are set --------------------------------------------------------------------------
-
-
-_PATIENCE = 12
-"""Rounds of growth before the registers that still grow are taken to grow throughout an episode."""
-_MOST_NARROWINGS = 7
-
-
-class Ranges:
-    """Finds, over repeated resolutions, ranges that hold whatever is set.
-
-    A register that follows from others is known when they are, which takes a round for each register on the way. One
-    that follows from itself, such as `n: n + 1`, is given what it can gain in a whole episode.
-
-    Attributes:
-        now: register -> the range to resolve with.
-        too_far: register -> the farthest number it may come to, of those that no register can hold.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.now: dict[str, Type] = {}
-        self.too_far: dict[str, int] = {}
-        self._rounds = 0
-        self._grew: set[str] = set()
-        self._growing: set[str] = set()
-        self._gains: dict[str, int] = {}
-        self._narrowings = 0
-        self._wide: dict[str, Type] | None = None
-        followed = Counter(member.frame for member in scenario.members().values())
-        setters = sum(bool(rule.set) for rule in scenario.rules)
-        for path, frame in frames_of(scenario):
-            own = sum(bool(entry.set) for entry in frame.all_effects())
-            setters += own * max(1, followed[str(path[-1])])
-        self._steps = scenario.horizon * setters
-
-    def settled(self, needed: Mapping[str, Type], read: Mapping[str, set[str]]) -> bool:
-        """Take note of the ranges that a resolution asked for; whether it had them already.
-
-        `read`: register -> the registers that the values it is set to follow from.
-        """
-        self._rounds += 1
-        for path, type_ in needed.items():
-            if abs(far := max(type_.low, type_.high, key=abs)) > LARGEST_NUMBER:
-                self.too_far.setdefault(path, far)
-        excess = {p: _excess(t, self.now.get(p)) for p, t in needed.items() if p not in self.too_far}
-        if self._wide is not None and (any(excess.values()) or self.now is self._wide):
-            return self._back()
-        growing = {path for path, more in excess.items() if more > self._gains.get(path, 0)}
-        if not growing:
-            return not self._gains or any(excess.values()) or not self._narrow(needed)
-        if self._rounds > self._steps:
-            return True  # as often as that nothing is set in an episode
-        spreads = bool(growing - self._grew) or growing < self._growing
-        widens = self._rounds > _PATIENCE and (bool(self._gains) or not spreads)
-        self._grew |= growing
-        self._growing = growing
-        following = {path: self.now[path] if path in self._gains else type_ for path, type_ in needed.items()}
-        for path in growing if widens else ():
-            if path in _sources(path, read):
-                self._gains[path] = excess[path]
-                following[path] = self._widened(needed[path], self.now[path])
-        self.now = {path: _cut(type_) for path, type_ in following.items()}
-        return False
-
-    def _narrow(self, needed: Mapping[str, Type]) -> bool:
-        """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
-        if self._narrowings == _MOST_NARROWINGS or needed == self.now:
-            return False
-        self._narrowings += 1
-        self._wide, self.now = self.now, dict(needed)
-        return True
-
-    def _back(self) -> bool:
-        """The narrower ranges do not hold: the last ones that did are taken. Whether they are taken already."""
-        assert self._wide is not None, "internal: nothing was narrowed"
-        done = self.now is self._wide
-        self.now = self._wide
-        return done
-
-    def _widened(self, needed: Type, now: Type) -> Type:
-        """A range that still grows, by as much as it can in a whole episode."""
-        low = needed.low - (now.low - needed.low) * self._steps if needed.low < now.low else needed.low
-        high = needed.high + (needed.high - now.high) * self._steps if needed.high > now.high else needed.high
-        return replace(needed, low=low, high=high)
-
-
-def _cut(type_: Type) -> Type:
-    """A range as far as a register can hold it."""
-    low, high = (max(-LARGEST_NUMBER, min(end, LARGEST_NUMBER)) for end in (type_.low, type_.high))
-    return replace(type_, low=low, high=high)
-
-
-def _sources(path: str, read: Mapping[str, set[str]]) -> set[str]:
-    """All registers that a register follows from, itself among them if it follows from itself."""
-    found: set[str] = set()
-    waiting = [path]
-    while waiting:
-        new = read.get(waiting.pop(), set()) - found
-        found |= new
-        waiting += new
-    return found
-
-
-def _excess(type_: Type, range_: Type | None) -> int:
-    """By how much a type goes beyond a range; beyond none by something."""
-    if range_ is None:
-        return 1
-    return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
-
-
-# -- what is heard reads as what it is, to all who hear it ----------------------------------------------------
-
-
-Spoken = Mapping[str, Mapping[DataPath, Line]]
-"""Member of the cast -> what it says, by place."""
-
-
-def _check_heard(resolver: Resolver, spoken: Spoken) -> None:
-    """Report names and lines that would be heard as if somebody else had spoken, or in another tone (S405)."""
-    findings, symbols = resolver.findings, resolver.symbols
-    divides = re.compile(":| to " if resolver.addresses else ":")
-    for member in symbols.cast:
-        path = symbols.member_path(member, "name")
-        with surviving():
-            for name in words_of_values(resolver.registers.read(f"{member}.name").type):
-                mark = divides.search(composed(name))
-                if findings.must_be_one_line(path, name) and mark is not None:
-                    what = "a colon" if mark.group() == ":" else "` to `"
-                    message = (
-                        f"the name `{name}` has {what} in it, so its lines read as those of somebody else"
-                    )
-                    hint = "what is heard reads `Ann: text`, or `Ann to Bob: text`; leave it out of names"
-                    findings.error("S405", message, findings.at(path), hint=hint)
-    tone = symbols.scenario.observe.tone
-    look = symbols.scenario.looks.get(tone) if tone is not None else None
-    for line in _of_npcs(spoken) if look is not None else ():
-        begun = (re.match(r"\(([^()]*)\)", composed(text)) for text in texts_of(line))
-        said = next(
-            (one for one in begun if one is not None and look is not None and one[1] in look.words), None
-        )
-        if said is not None:
-            message = f"`{said[0]}` reads as the tone of what is said, which the look `{tone}` gives"
-            findings.error("S405", message, line.span, hint="leave it out; the tone is heard anyway")
-
-
-def _report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> None:
-    """Warn of what people tell apart and a trained agent does not, which hears words alone (W406)."""
-    findings, symbols = resolver.findings, resolver.symbols
-    called: dict[tuple[str, ...], tuple[str, str]] = {}
-    for member, name in zip(symbols.cast, names, strict=True):
-        for text in words_of_values(name.type):
-            first, known = called.setdefault(tuple(words(text)), (member, text))
-            if first != member and known != text:
-                message = (
-                    f"`{text}` and `{known}`, which `{first}` is called, are one name to a trained agent"
-                )
-                _warn(resolver, message, text, findings.at(symbols.member_path(member, "name")))
-    heard: dict[tuple[str, tuple[str, ...]], tuple[str, Span]] = {}
-    told: set[Span] = set()
-    for member, lines in spoken.items():
-        who = member if symbols.scenario.observe.names == "shown" else ""
-        for line in _of_npcs({member: lines}):
-            for text in texts_of(line):
-                known, span = heard.setdefault((who, tuple(words(text))), (_shown(text), line.span))
-                if known != _shown(text) and line.span not in told:
-                    told.add(line.span)
-                    where = f"line {span.line}" if span.file == line.span.file else str(span)
-                    message = f'"{text}" and "{known}" ({where}) are the same to a trained agent'
-                    _warn(resolver, message, text, line.span)
-
-
-def _warn(resolver: Resolver, message: str, text: str, span: Span) -> None:
-    hears = " ".join(words(text)) or "none"
-    hint = f"it hears words alone, here {hears}; say what matters in words"
-    resolver.findings.warning("W406", message, span, hint=hint)
-
-
-def _shown(text: str) -> str:
-    return " ".join(composed(text).split())
-
-
-def _of_npcs(spoken: Spoken) -> Iterator[Line]:
-    """All lines but the agent's, whose own utterances are actions."""
-    for member, lines in spoken.items():
-        yield from lines.values() if member != "agent" else ()
-
-
 # -- the whole scenario --------------------------------------------------------------------------------------
 
 
@@ -464,6 +276,7 @@ def check_meaning(
             continue
         if found.has_errors or (ranges.settled(registers.ranges, registers.sources) and settled):
             run.report_too_far(ranges.too_far)
+            run.report_heard(checked is not None)
             if checked is not None:
                 check_absences(checked, findings, check_placements(checked, findings))
             if checked is not None and not found.has_errors:
@@ -515,6 +328,7 @@ class _Run:
         self._symbols = entities.symbols_of(scenario, prelude, sizes, findings)
         self._played = entities.played_frames(self._symbols, findings)
         self.resolver = ScenarioResolver(self._symbols, findings, self._played, words, ranges)
+        self._heard: dict[str, dict[DataPath, Line]] | None = None
 
     def checked(self, name: str) -> CheckedScenario | None:
         """The checked scenario; None if it cannot be put together."""
@@ -543,7 +357,7 @@ class _Run:
             with surviving():
                 rows.check_tone(resolver, scenario.observe.tone)
         possible.check_flow(scenario, findings)
-        spoken = self._spoken()
+        self._heard = spoken = self._spoken()
         outcomes = tuple(self._outcomes())
         plans = tuple(self._plans(spoken))
         self._look_at_unused()
@@ -556,7 +370,6 @@ class _Run:
         inhabitants = tuple(entities_of(resolver))
         believed = tuple(object_facts.beliefs(resolver))
         accepting = tuple(object_facts.accepting(resolver))
-        _check_heard(resolver, spoken)
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
@@ -570,7 +383,6 @@ class _Run:
             possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
-        _report_alike(resolver, spoken, names)
         words = words_in_order(
             self._symbols.sentences,
             names,
@@ -783,14 +595,22 @@ class _Run:
             return 900
         return round(float(found.group(1)) * 1000)
 
+    def report_heard(self, is_whole: bool) -> None:
+        """What hearers take for something else; what only some of them tell apart, if the scenario `is_whole`."""
+        if self._heard is None:
+            return
+        hearing.check_speakers(self.resolver, self._heard)
+        if is_whole:
+            names = [self.resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
+            hearing.report_alike(self.resolver, self._heard, names)
+
     def report_too_far(self, grown: Mapping[str, int]) -> None:
         """Registers that may come to numbers that none can hold: as they are set (`grown`), or to begin with."""
         registers, places = self.resolver.registers, self._findings.places
         found, spans = dict(grown), dict[str, Span]()
         for drawn in (*registers.drawn(), *registers.remembered):
-            far = max(drawn.type.low, drawn.type.high, key=abs)
-            if drawn.type.kind == "int" and abs(far) > LARGEST_NUMBER:
-                found.setdefault(drawn.path.partition("(")[0], far)
+            if drawn.type.kind == "int" and abs(drawn.type.farthest) > LARGEST_NUMBER:
+                found.setdefault(drawn.path.partition("(")[0], drawn.type.farthest)
                 spans[drawn.path] = drawn.value.span
         for path, far in found.items():
             declaration, hint = registers.declaration(path), "bound it: `min(..., 1000)`"

@@ -51,7 +51,8 @@ from socialai_dsl.semantics.terms import (
 )
 
 MAX_GROUP = 256
-_WIDE = 4096
+WIDE: Final = 4096
+"""Types with more values than this are not walked through value by value."""
 MAX_WEIGHT = 100
 THOSE: Final = "those"
 _MOST_CELLS = 28 * 28
@@ -422,7 +423,7 @@ def values_of(resolver: Resolver, term: Term) -> frozenset[int] | range:
 
 def _union(parts: list[frozenset[int] | range]) -> frozenset[int] | range:
     """All of some values; of a wide range not one by one."""
-    if any(isinstance(part, range) and len(part) > _WIDE for part in parts):
+    if any(isinstance(part, range) and len(part) > WIDE for part in parts):
         return range(min(map(min, parts)), max(map(max, parts)) + 1)
     return frozenset().union(*parts)
 

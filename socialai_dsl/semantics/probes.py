@@ -164,9 +164,10 @@ class _Entry:
     def _value(self, part: str, sited: SitedTerm) -> Drawn:
         """A value with a register of its own."""
         type_ = sited.term.type
-        far = max(type_.low, type_.high, key=abs)
-        if abs(far) > LARGEST_NUMBER:
-            raise self._findings.too_large("this", far, sited.span, hint="bound it: `min(..., 100)`")
+        if abs(type_.farthest) > LARGEST_NUMBER:
+            raise self._findings.too_large(
+                "this", type_.farthest, sited.span, hint="bound it: `min(..., 100)`"
+            )
         self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
         return self._values[-1]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics.groups import values_of
+from socialai_dsl.semantics.groups import WIDE, values_of
 from socialai_dsl.semantics.resolver import ANY_TEXT, Resolver
 from socialai_dsl.semantics.scope import (
     KEY,
@@ -35,7 +35,6 @@ from socialai_dsl.vocabulary import is_number, is_plain
 
 _NO_KEYS = ("entity", "cell", "bool", "utterance")
 """Kinds of values that no words stand for."""
-_WIDE = 4096
 
 
 def look_at_all(resolver: Resolver) -> None:
@@ -57,7 +56,7 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     possible = values_of(resolver, key)
     cases: dict[int, Term] = {}
     # Few values far from each other have a wide type.
-    for value in sorted(possible) if isinstance(possible, frozenset) and len(known) > _WIDE else known:
+    for value in sorted(possible) if isinstance(possible, frozenset) and len(known) > WIDE else known:
         word = spoken(key.type, value)
         if word not in keys and value not in possible:
             continue

@@ -52,6 +52,11 @@ class Type(Leaf):
         return self.high - self.low + 1
 
     @property
+    def farthest(self) -> int:
+        """The value that is farthest from zero."""
+        return max(self.low, self.high, key=abs)
+
+    @property
     def values(self) -> range:
         """All of them."""
         return range(self.low, self.high + 1)

@@ -107,10 +107,8 @@ class Check(_Message):
     text: str
 
 
-Question = Annotated[
-    Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check,
-    Field(discriminator="do"),
-]
+_GameQuestion = Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check
+Question = Annotated[_GameQuestion, Field(discriminator="do")]
 QUESTIONS: Final[TypeAdapter[Question]] = TypeAdapter(Question)
 """What a process is asked."""
 
@@ -212,10 +210,7 @@ class Add(_Message):
 
 FileQuestion = Hello | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add
 WINDOW_QUESTIONS: Final[TypeAdapter[Any]] = TypeAdapter(
-    Annotated[
-        Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check | FileQuestion,
-        Field(discriminator="do"),
-    ]
+    Annotated[_GameQuestion | FileQuestion, Field(discriminator="do")]
 )
 """What a window may ask."""
 

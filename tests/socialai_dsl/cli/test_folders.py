@@ -131,7 +131,7 @@ WRITES = {
 def test_the_second_writer_of_a_folder_hears_of_the_first(
     command: str, moved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
-    """Whatever the folder holds: who writes it is asked before what is in it, and nothing is changed."""
+    """The lock comes before all other checks, and nothing in the folder changes."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(run_folder, "_SECONDS_TO_WAIT", 0.1)
     assert main(["new", "corridor"]) == 0
