@@ -30,6 +30,8 @@ from socialai_dsl.source import Data, DataPath, Node
 
 _TEXTS: Final = ("say", "ask", "answers")
 """Keys whose values are texts with values in them."""
+_PROSE: Final = ("about", "notes", "skills")
+"""Keys whose values are texts for people."""
 
 _NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
 _WORDS: Final = {
@@ -113,12 +115,17 @@ def _signatures(cursor: Cursor) -> Iterable[Signature]:
     table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
     return (
         ()
-        if cursor.is_key or (key in (*_TEXTS, "about", "notes") and "<" not in cursor.before)
+        if cursor.is_key or _is_prose(cursor.path) or (key in _TEXTS and "<" not in cursor.before)
         else (
             *table.values(),
             *(s for s in SIGNATURES if s.name not in table),
         )
     )
+
+
+def _is_prose(path: DataPath) -> bool:
+    """Whether a text for people stands there, in which words of the language mean nothing."""
+    return last_key(path) in _PROSE or path[:1] == ("instructions",)
 
 
 def usage(signature: Signature) -> str:
@@ -204,9 +211,9 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
         yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
     elif key == "hears":
         yield from _utterances(data)
-    elif key in (*_TEXTS, "about", "notes", "skills") and cursor.before.rpartition("<")[2].count(">") != 0:
+    elif _is_prose(cursor.path) or (key in _TEXTS and cursor.before.rpartition("<")[2].count(">") != 0):
         return
-    elif key not in ("about", "notes", "skills") and (key not in _TEXTS or "<" in cursor.before):
+    elif key not in _TEXTS or "<" in cursor.before:
         yield from _in_expression(cursor, data, key, root)
 
 

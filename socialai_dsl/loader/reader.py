@@ -258,10 +258,12 @@ def _refused(text: str, reading: str, otherwise: str | None = None) -> Plain:
     return Plain(text, "S003", f"`{text}` is {reading}", hint)
 
 
-_TEXTS: Final = frozenset("say hears templates about notes note skills name state goto goto_now".split())
+_TEXTS: Final = frozenset(
+    "say hears templates about notes note skills instructions name state goto goto_now".split()
+)
 """Keys of the language whose values are texts or names of states."""
 
-_PROSE: Final = frozenset("about notes note skills".split())
+_PROSE: Final = frozenset("about notes note skills instructions".split())
 """Texts for people, for which `null` says that there is none."""
 
 _AUTHORS: Final = frozenset(
@@ -305,6 +307,8 @@ def _is_text(keys: list[str]) -> bool:
     """Whether nothing but a text, or a name, can stand there."""
     match keys:
         case [*_, "frames", _, "start"] | [*_, "probes", _, "ask" | "answers"]:
+            return True
+        case ["instructions", _] | ["set" | "add", "instructions"] | ["set" | "add", "instructions", _]:
             return True
         case [*_, parent, _] if parent in _AUTHORS:
             return False

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, WithJsonSchema
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    WithJsonSchema,
+)
 from pydantic.config import JsonDict
 
 from socialai_dsl.source import DataPath
@@ -23,6 +32,9 @@ def _unchanged(value: Any) -> Any:
 
 Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
 """A name that an author declares: letters, digits and underscores, not starting with a digit."""
+
+LANGUAGE_TAG: Final = r"^[a-z]{2,3}(-[A-Z][a-z]{3})?(-([A-Z]{2}|[0-9]{3}))?$"
+"""Language, perhaps script, perhaps country or region."""
 
 WORD_SCHEMA: Final[JsonDict] = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$", "maxLength": 40}
 """The same for keys of a mapping whose known keys have fields; pydantic leaves their names out."""
@@ -47,6 +59,19 @@ TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null)]
 
 Prose = Annotated[str, as_written(str | float | bool)]
 """A text for people."""
+
+LanguageTag = Annotated[str, StringConstraints(pattern=LANGUAGE_TAG)]
+"""A language as a short BCP 47 tag: `en`, `zh-Hant`, `pt-BR`."""
+
+NOT_BLANK: Final = r"\S"
+_Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=4000)]
+_Instruction = Annotated[_Told, as_written(_Told | float | bool)]
+Instructions = Annotated[
+    Annotated[_Instruction, Tag("text")]
+    | Annotated[Annotated[dict[LanguageTag, _Instruction], Field(min_length=1)], Tag("mapping")],
+    Discriminator(lambda value: "mapping" if isinstance(value, dict) else "text"),
+]
+"""A text for players, or one for each of several languages."""
 
 StateName = Annotated[Word, as_written(Word | bool | _Null)]
 """The name of a state."""
@@ -662,6 +687,11 @@ class Scenario(Model):
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
     skills: ListOf[Prose] = Field((), description="the skills that it needs, for people")
+    instructions: Instructions | None = Field(
+        None,
+        description="what players are told before the first observation: a text, or a mapping from languages to texts",
+        examples=["Reach the exit."],
+    )
     training_frames: int | None = Field(
         None, ge=1, description="how long the recipe guided trains an agent for"
     )

@@ -21,7 +21,18 @@ from socialai_dsl.schema.annotations import (
     literals,
     model_at,
 )
-from socialai_dsl.schema.scenario import FirstRule, Npc, Register, Scenario, State, Step, ThenRule, WorldRule
+from socialai_dsl.schema.scenario import (
+    LANGUAGE_TAG,
+    NOT_BLANK,
+    FirstRule,
+    Npc,
+    Register,
+    Scenario,
+    State,
+    Step,
+    ThenRule,
+    WorldRule,
+)
 from socialai_dsl.source import Data, DataPath, Node, Span
 
 _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
@@ -362,8 +373,8 @@ _STAND_INS: Final[dict[str, Data]] = {
 """What stands for the parts that every scenario needs where a file lacks them, so that its other mistakes are found."""
 
 _INDIFFERENT: Final = frozenset(
-    "scenario outcome room about notes skills training_frames horizon earshot view kind kind_code audible color facing "
-    "reward id after chance once npcs image names own_voice canvas actions do".split()
+    "scenario outcome room about notes skills instructions training_frames horizon earshot view kind kind_code audible "
+    "color facing reward id after chance once npcs image names own_voice canvas actions do".split()
 )
 """Keys whose loss makes nothing else in the file wrong."""
 
@@ -525,6 +536,9 @@ class _Report:
             hint = "a name in `define` can stand for a part of it"
             message = f"what is set has more than {finding.context['max_length']} characters"
             self._bag.error("S106", message, span, hint=hint)
+        elif finding.context.get("pattern") == LANGUAGE_TAG:
+            hint = "a language is a short tag such as `en`, `de` or `pt-BR`"
+            self._bag.error("S104", f"`{key}` is not a language", span, hint=hint)
         else:
             hint = (
                 "a name has letters, digits and `_`, and does not begin with a digit; 40 characters at most"
@@ -544,11 +558,16 @@ class _Report:
                 hint = _as_share(finding.value, finding.context.get("le"))
                 self._bag.error("S106", f"`{finding.value}` is {_bound(finding)}", span, hint=hint)
                 return
+            if finding.kind == "too_short" and any(p[:-1] == finding.path for p in self._repaired.lost):
+                return  # what is in it has been reported
             if finding.kind in ("too_short", "too_long", "string_too_short", "string_too_long"):
                 self._bag.error("S106", _length(finding), span)
                 return
             if finding.kind == "literal_error":
                 self._literal(finding, span)
+                return
+            if finding.context.get("pattern") == NOT_BLANK:
+                self._bag.error("S106", f"`{finding.key}` is empty", span)
                 return
             if finding.kind == "string_pattern_mismatch":
                 hint = "a name has letters, digits and `_`, and does not begin with a digit"

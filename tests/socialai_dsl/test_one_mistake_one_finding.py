@@ -22,7 +22,7 @@ SCENARIOS = sorted(
     if path.read_text(encoding="utf-8").startswith("scenario:")
 )
 KEYS = {key for model in CALLED for key in keys_of(model) if len(key) > 3}
-PROSE = re.compile(r"^(about|notes|skills):.*\n(?:  .*\n)*", re.MULTILINE)
+PROSE = re.compile(r"^(about|notes|skills|instructions):.*\n(?:  .*\n)*", re.MULTILINE)
 """What no machine reads."""
 
 Site = tuple[int, int, str]

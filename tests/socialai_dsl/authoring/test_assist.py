@@ -62,6 +62,7 @@ def offered(text: str, folder: Path | None = None) -> list[str]:
         ("outcome:", "observe: {npcs: ^}\noutcome:", "hidden"),
         ("outcome:", "actions: [t^]\noutcome:", "toggle"),
         ("outcome:", "prob^\noutcome:", "probes"),
+        ("outcome:", "instr^\noutcome:", "instructions"),
         ("outcome:", "probes: {q: {an^}}\noutcome:", "answers"),
         ("outcome:", "probes: {q: {when: ann.^}}\noutcome:", "is"),
         ("outcome:", "probes: {q: {answer: exit.c^}}\noutcome:", "color"),
@@ -78,6 +79,8 @@ def test_completion(old: str, new: str, expected: str | None) -> None:
 
 def test_no_prose_is_completed() -> None:
     assert offered(TEXT.replace("objects:", "about: The ^\nobjects:")) == []
+    assert offered(TEXT.replace("objects:", "instructions: The <^\nobjects:")) == []
+    assert offered(TEXT.replace("objects:", "instructions: {en: The ^}\nobjects:")) == []
     assert offered(TEXT.replace("say: There.", "say: Th^")) == []
     assert offered(TEXT.replace("outcome:", "probes: {q: {ask: Wh^}}\noutcome:")) == []
 

@@ -42,6 +42,9 @@ TEXTS = [
     ("grammar", "templates", 0),
     ("cast", "ann", "name"),
     ("cast", "team", "name", 1),
+    ("instructions", "en"),
+    ("set", "instructions.en"),
+    ("set", "instructions", "en"),
     ("set", "frames.f.states.s.then[0].say"),
     ("add", "frames.f.states", "off", "then", 0, "say"),
 ]  # fmt: skip
