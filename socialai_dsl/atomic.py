@@ -1,4 +1,4 @@
-"""Atomic writes of small files: a reader never sees half of one."""
+"""Small files: written in one go, so that a reader never sees half of one, and JSON objects read."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from socialai_dsl.errors import UnreadableError
 
 
 def write_text(path: Path, text: str) -> None:
@@ -30,3 +32,19 @@ def write_text(path: Path, text: str) -> None:
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write a JSON object by replacing the file in one go."""
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises:
+        OSError: the file cannot be read.
+        UnreadableError: it holds something else.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UnreadableError(f"{path}: expected JSON, {error}") from None
+    if not isinstance(content, dict):
+        raise UnreadableError(f"{path}: expected a JSON object, got {type(content).__name__}")
+    return content

@@ -9,6 +9,10 @@ class UsageError(ValueError):
     """The caller asked for something that cannot be done; the message says what was got and expected."""
 
 
+class UnreadableError(UsageError):
+    """A file of ours is damaged, or of another version; the message says which and how."""
+
+
 class RunFailed(Exception):  # noqa: N818 - it says what happened
     """A run stopped by itself: its numbers are no longer finite, the disk is full, or a budget is spent."""
 
@@ -20,6 +24,14 @@ _BOUNDS: Final = {
     "less_than": "less than {lt:g}",
 }
 """Kinds of pydantic's errors whose words are ours."""
+
+
+def described_error(error: Exception) -> str:
+    """What a person is told of an error of a file."""
+    if isinstance(error, OSError):
+        place = f": {error.filename}" if error.filename is not None else ""
+        return f"{error.strerror or error}{place}"
+    return str(error)
 
 
 def first_mistake(errors: Sequence[Mapping[str, Any]]) -> tuple[str, str]:

@@ -11,6 +11,7 @@ import pytest
 from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
 from trainer import checkpoint as checkpoints
+from trainer.files import CHECKPOINTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -48,7 +49,7 @@ def run(*words: str) -> None:
 
 def weights(run_folder: Path) -> dict[str, Any]:
     """Everything that the last checkpoint holds."""
-    return checkpoints.read(run_folder / checkpoints.FOLDER).tensors
+    return checkpoints.read(run_folder / CHECKPOINTS).tensors
 
 
 def test_the_page_has_an_example_of_each() -> None:
@@ -83,7 +84,7 @@ def test_an_example_trains_and_resumes_exactly(
         assert rows[0]["led"] == 1
         assert rows[1]["led"] < 1, "the share of the script fades"
 
-    _, last = sorted(Path("whole", checkpoints.FOLDER).iterdir())
+    _, last = sorted(Path("whole", CHECKPOINTS).iterdir())
     last.unlink()
     run("--resume", "whole")
     resumed = weights(Path("whole"))

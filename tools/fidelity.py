@@ -10,10 +10,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import write_text
 from tools.fidelity_page import page
 from tools.fidelity_statistics import Comparison, Published, compare
 

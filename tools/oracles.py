@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.cli.terminal import ProgressLine
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.scripts import UNPROVEN, VERDICTS, ScriptReport, UnsolvedRoom, play_script
 from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
-from socialai_dsl.run_folder import write_text
 
 SUMMARY: Final = "let the scenarios' own scripts play, and search the rooms that they do not solve"
 

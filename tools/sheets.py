@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
-from socialai_dsl.run_folder import read_json, write_json, write_text
 
 if TYPE_CHECKING:
     import numpy as np

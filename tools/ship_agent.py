@@ -38,12 +38,13 @@ import numpy as np
 import torch
 
 import socialai_dsl
+from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.export import MovedScenario, finished_agent, write_agent
 from socialai_dsl.evaluation.players import Player
 from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent
-from socialai_dsl.run_folder import RESULT, read_json, write_text
+from socialai_dsl.runs.folder import RESULT
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint
 from trainer.shipped import PREFIX, WEIGHTS, agents_folder

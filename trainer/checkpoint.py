@@ -19,11 +19,9 @@ from torch import Tensor
 
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError
+from trainer.files import CHECKPOINTS, SUFFIX, checkpoint_files
 from trainer.nets import ActorCritic, NetSpec, build_net
 from trainer.shipped import located
-
-FOLDER = "checkpoints"
-"""Where a run keeps its checkpoints, in its own folder."""
 
 FORMAT = 2
 _HEADER_LIMIT = 1_000_000
@@ -92,9 +90,9 @@ def write(directory: Path, checkpoint: Checkpoint, keep: int = 2) -> Path:
     if keep < 1:
         raise ValueError(f"keep: got {keep}, expected at least 1")
     directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{checkpoint.meta.frames:015d}.safetensors"
+    path = directory / f"{checkpoint.meta.frames:015d}{SUFFIX}"
     write_file(path, checkpoint)
-    written = [file for file in sorted(directory.glob("*.safetensors")) if file <= path]
+    written = [file for file in checkpoint_files(directory) if file <= path]
     for old in [*written[:-keep], *directory.glob("*.tmp")]:
         old.unlink(missing_ok=True)
     return path
@@ -146,7 +144,7 @@ def read(path: Path) -> Checkpoint:
     if not path.is_dir():
         return _read_file(path)
     failures = []
-    for candidate in sorted(path.glob("*.safetensors"), reverse=True):
+    for candidate in reversed(checkpoint_files(path)):
         try:
             checkpoint = _read_file(candidate)
         except CheckpointError as error:
@@ -166,7 +164,7 @@ def read_agent(agent: Path | str) -> Checkpoint:
         ValueError: no agent of this name ships.
     """
     path = located(agent)
-    saved = path / FOLDER
+    saved = path / CHECKPOINTS
     return read(saved if saved.is_dir() else path)
 
 

@@ -17,10 +17,8 @@ import torch
 from numpy.typing import NDArray
 
 from trainer.config import RunConfig
+from trainer.files import METRICS, STARTS
 from trainer.session import Session, State
-
-FILE_NAME = "metrics.jsonl"
-STARTS = "starts.jsonl"
 
 
 @dataclass
@@ -144,7 +142,7 @@ class MetricsLog:
         tracker: Tracker | None = None,
     ) -> None:
         run_dir.mkdir(parents=True, exist_ok=True)
-        path = run_dir / FILE_NAME
+        path = run_dir / METRICS
         _cut_back(path, update)
         self._tracker = tracker
         if tracker is not None:

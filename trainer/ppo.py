@@ -15,10 +15,10 @@ import torch
 from torch import Tensor, nn
 
 from trainer import actions as heads
-from trainer import checkpoint as checkpoints
 from trainer.chunks import Chunks, chunks
 from trainer.config import RunConfig
 from trainer.errors import require_finite
+from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.logging import Metrics, MetricsLog, Tracker
 from trainer.minibatch import Batch, Environments, environments
 from trainer.rollout import Rollout, collect
@@ -320,7 +320,7 @@ def train(
     """
     run_dir = Path(run_dir)
     session = Session.start(config, envs, program)
-    if not resume and any((run_dir / checkpoints.FOLDER).glob("*.safetensors")):
+    if not resume and checkpoint_files(run_dir / CHECKPOINTS):
         raise ValueError(f"run_dir: {run_dir} holds a run already; resume it, or choose another folder")
     if resume:
         session.resume(run_dir)

@@ -23,6 +23,7 @@ from trainer.config import RunConfig
 from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.features import Actor, Int64
+from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.guides import Guide, build_guide
 from trainer.nets import NetSpec, build_net
 
@@ -182,13 +183,11 @@ class Session:
 
     def save(self, run_dir: Path) -> Path:
         """Write a checkpoint into a run's folder and return its path."""
-        return checkpoints.write(
-            run_dir / checkpoints.FOLDER, self.checkpoint(), self.config.keep_checkpoints
-        )
+        return checkpoints.write(run_dir / CHECKPOINTS, self.checkpoint(), self.config.keep_checkpoints)
 
     def resume(self, run_dir: Path) -> None:
         """Continue from the newest intact checkpoint in a run's folder; see `load`."""
-        folder = run_dir / checkpoints.FOLDER
+        folder = run_dir / CHECKPOINTS
         if not folder.is_dir():
             raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
         self.load(checkpoints.read(folder))
@@ -279,7 +278,7 @@ def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
     except BrokenPipeError:  # of the terminal that progress is shown on, not of a file
         raise
     except (TrainingStopped, ObservationError, OSError) as error:
-        saved = max((run_dir / checkpoints.FOLDER).glob("*.safetensors"), default=None)
+        saved = max(checkpoint_files(run_dir / CHECKPOINTS), default=None)
         kept = f"the last good checkpoint is {saved}" if saved else "there is no checkpoint yet"
         reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
         where = f"training stopped after {session.frames} frames (update {session.update})"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
+from socialai_dsl.runs.folder import METRICS
 
 if TYPE_CHECKING:
     from socialai_dsl.reporting.analysis import Summary
@@ -27,7 +28,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> Exit:
         raise UsageError(str(error)) from error
     for run in experiment.runs:
         if run.updates() is None:
-            said = "; ".join(run.problems) or "it has no metrics.jsonl that can be read"
+            said = "; ".join(run.problems) or f"it has no {METRICS} that can be read"
             raise UsageError(f"{run.folder}: expected the folder of a run that has learned, {said}")
     summaries = [Summary(condition) for condition in experiment.conditions]
     conditions_figure(summaries).savefig(out)

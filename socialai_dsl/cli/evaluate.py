@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import socialai_dsl
+from socialai_dsl.atomic import write_json, write_text
 from socialai_dsl.cli.arguments import episodes, identifier, natural, refuse, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_options
@@ -30,16 +31,8 @@ from socialai_dsl.evaluation.recordings import write_recordings
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.testing import Evaluation, own_scenario, play_test_set
 from socialai_dsl.replay.endings import short_name
-from socialai_dsl.run_folder import (
-    REPLAY,
-    RESULT,
-    SETTINGS,
-    only_writer,
-    scenario_folder_name,
-    versions,
-    write_json,
-    write_text,
-)
+from socialai_dsl.runs.folder import CONFIG, REPLAY, RESULT, only_writer, scenario_folder_name
+from socialai_dsl.runs.versions import versions
 from trainer.config import RunConfig
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
@@ -135,7 +128,7 @@ def _evaluate(arguments: argparse.Namespace, player: Player, out: Path | None) -
             kept = keep_scenario(place, scenario, loaded).scenario
             # As a run that trained nothing, so that reports take it as one.
             settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
-            write_json(place / SETTINGS, settings)
+            write_json(place / CONFIG, settings)
         evaluation = play_test_set(playing, scenario, loaded, compiled(loaded), arguments.episodes)
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
@@ -180,7 +173,7 @@ def _player(arguments: argparse.Namespace) -> Player:
     if agent in UNTRAINED:
         return Player(agent, seed=drawn)
     require_trainer()
-    has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
+    has_own = arguments.on is None or (folder_of(agent) / CONFIG).is_file()
     scenario = own_scenario(agent) if has_own else arguments.on[0]
     return Player(
         agent,

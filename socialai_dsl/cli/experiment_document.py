@@ -9,7 +9,7 @@ from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.document import document_of
-from socialai_dsl.experiments.folder import EXPERIMENT, UnreadableError, read_experiment
+from socialai_dsl.experiments.folder import read_experiment
 from socialai_dsl.frontend import load_experiment
 from socialai_dsl.loader.reader import shipped_experiments
 from socialai_dsl.loader.resolved import looks_like_path
@@ -23,7 +23,7 @@ def asked_for(arguments: Namespace) -> tuple[dict[str, Any], Path]:
             raise UsageError(
                 f"{given} is a folder, which says itself what is run; --out and --profile are for files"
             )
-        return kept(given), given
+        return read_experiment(given), given
     if not given.exists() and not looks_like_path(arguments.file):
         shipped = shipped_experiments()
         if arguments.file not in shipped:
@@ -47,17 +47,6 @@ def _profile(loaded: LoadedExperiment, asked: str | None) -> str | None:
         hint = suggested(asked, profiles, f"; the file's profiles are {', '.join(profiles) or 'none'}")
         raise UsageError(f"--profile: there is no {asked!r}{hint}")
     return asked
-
-
-def kept(folder: Path) -> dict[str, Any]:
-    """What an experiment's folder says is run."""
-    try:
-        document = read_experiment(folder)
-    except UnreadableError as error:
-        raise UsageError(str(error)) from None
-    if document is None:
-        raise UsageError(f"{folder} is no experiment's folder, it has no {EXPERIMENT}")
-    return document
 
 
 def threads(document: dict[str, Any]) -> int:

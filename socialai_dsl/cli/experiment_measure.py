@@ -11,14 +11,15 @@ from typing import IO, Final
 from socialai_dsl.errors import RunFailed
 from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.estimate import Speeds, remember
-from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.folder import PlannedRun
+from socialai_dsl.runs.folder import METRICS
 
 # A few updates of either kind of network: 8,192 frames each for `fast`, 640 for the paper's presets.
 _FRAMES: Final = {"paper-reference": 2_560, "paper-reference-tuned": 2_560}
 _USUAL_FRAMES: Final = 24_576
 
 
-def measure_unknown(runs: Sequence[Run], speeds: Speeds, stream: IO[str]) -> None:
+def measure_unknown(runs: Sequence[PlannedRun], speeds: Speeds, stream: IO[str]) -> None:
     """Measure every network of which no run tells the speed, and remember it for this machine.
 
     Raises:
@@ -36,7 +37,7 @@ def measure_unknown(runs: Sequence[Run], speeds: Speeds, stream: IO[str]) -> Non
     speeds.look_again()
 
 
-def _measured(run: Run) -> float:
+def _measured(run: PlannedRun) -> float:
     """Frames per second after the first update, in which code is compiled and memory is found."""
     options = run.condition["options"]
     frames = _FRAMES.get(str(options["net"]), _USUAL_FRAMES)
@@ -57,7 +58,7 @@ def _measured(run: Run) -> float:
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode:
             raise RunFailed(f"the measurement broke down: {done.stderr.strip()}")
-        lines = (Path(place) / "run" / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+        lines = (Path(place) / "run" / METRICS).read_text(encoding="utf-8").splitlines()
     rows = [json.loads(line) for line in lines]
     later = rows[1:] or rows
     return len(later) / sum(1 / float(row["frames_per_second"]) for row in later)

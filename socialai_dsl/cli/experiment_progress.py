@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from socialai_dsl.cli.experiment_tables import clock, seconds_left
-from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.folder import PlannedRun
 
 _SECONDS_BETWEEN_LINES: Final = 30.0
 _SECONDS_BETWEEN_LOOKS: Final = 2.0
@@ -26,7 +26,7 @@ _OTHER_LINES: Final = 4
 class RunsProgress:
     """Reports ends of runs, and how far those at work are; use it in a `with` statement."""
 
-    def __init__(self, runs: Sequence[Run], stream: IO[str]) -> None:
+    def __init__(self, runs: Sequence[PlannedRun], stream: IO[str]) -> None:
         """Report on `runs`, writing to `stream`."""
         self._all = runs
         self._left = {run.id: run for run in runs}
@@ -52,7 +52,7 @@ class RunsProgress:
         if self._live is not None:
             self._live.stop()
 
-    def ended(self, run: Run, outcome: str, message: str) -> None:
+    def ended(self, run: PlannedRun, outcome: str, message: str) -> None:
         """Report that a run has come to its end."""
         self._ends[outcome] += 1
         self._left.pop(run.id, None)
@@ -80,13 +80,13 @@ class RunsProgress:
             more = f", and {len(at_work) - 4} more" if len(at_work) > 4 else ""
             print(f"{self._sum(len(at_work))}; at work: {runs}{more}", file=self._stream, flush=True)
 
-    def _at_work(self) -> list[tuple[Run, float, float | None]]:
+    def _at_work(self) -> list[tuple[PlannedRun, float, float | None]]:
         """Runs that a process works on, here or elsewhere: how far each is, and its last frames per second."""
         found = []
         for run in self._left.values():
-            if run.shown_status().state != "running":
+            if run.shown_status.state != "running":
                 continue
-            row = run.last_metrics() or {}
+            row = run.last_metrics or {}
             wanted = run.condition["frames"] or 1
             found.append((run, min(1.0, row.get("frames", 0) / wanted), row.get("frames_per_second")))
         return found
@@ -116,7 +116,7 @@ class RunsProgress:
         return f"{clock(now - self._began)}: {', '.join(counts)}{self._estimate}"
 
 
-def _success(run: Run) -> str:
-    result = run.result() or {}
+def _success(run: PlannedRun) -> str:
+    result = run.result or {}
     rate = result.get("eval", {}).get("success_rate")
     return "-" if rate is None else f"{rate:.3f}"

@@ -11,7 +11,7 @@ from typing import Any
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_document import asked_for, kept, threads, workers
+from socialai_dsl.cli.experiment_document import asked_for, threads, workers
 from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
 from socialai_dsl.cli.terminal import json_text
@@ -23,9 +23,9 @@ from socialai_dsl.experiments.engines import Engine, MissingEngineError
 from socialai_dsl.experiments.engines.local import LocalEngine
 from socialai_dsl.experiments.engines.ray import RayEngine
 from socialai_dsl.experiments.engines.slurm import SlurmEngine
-from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, Run, runs_of
+from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, PlannedRun, read_experiment, runs_of
 from socialai_dsl.experiments.work import Outcome
-from socialai_dsl.run_folder import only_writer
+from socialai_dsl.runs.folder import only_writer
 
 
 def run(arguments: argparse.Namespace) -> Exit:
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> Exit:
 def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespace) -> None:
     """Make the experiment's folder, or see that it is one of the same experiment."""
     if (folder / EXPERIMENT).exists():
-        changed = differences(kept(folder), document)
+        changed = differences(read_experiment(folder), document)
         if changed and not arguments.update:
             shown = changed[:10] + ([f"and {len(changed) - 10} more"] if len(changed) > 10 else [])
             listed = "".join(f"\n  {line}" for line in shown)
@@ -80,7 +80,7 @@ def _engine(arguments: argparse.Namespace, document: dict[str, Any], folder: Pat
 
 
 def work_on(
-    folder: Path, document: Mapping[str, Any], runs: Sequence[Run], engine: Engine, as_json: bool
+    folder: Path, document: Mapping[str, Any], runs: Sequence[PlannedRun], engine: Engine, as_json: bool
 ) -> Exit:
     """Work on the runs that are left, and report their results.
 
@@ -92,7 +92,7 @@ def work_on(
     stream = sys.stderr if as_json else sys.stdout
     with _stopped_by_signals(), RunsProgress(runs, stream) as shown:
 
-        def ended(run: Run, outcome: Outcome, message: str) -> None:
+        def ended(run: PlannedRun, outcome: Outcome, message: str) -> None:
             outcomes[outcome.value] += 1
             shown.ended(run, outcome.value, message)
 

@@ -5,20 +5,19 @@ import sys
 
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_document import kept
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
 from socialai_dsl.cli.terminal import counted, json_text
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments import work
-from socialai_dsl.experiments.folder import Run, runs_of, worker_of
+from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
 
 
 def status(arguments: argparse.Namespace) -> Exit:
     """Print how far the runs are."""
     if arguments.json:
         refuse(arguments, ("each",), "the JSON object has every run")
-    document = kept(arguments.folder)
+    document = read_experiment(arguments.folder)
     figures = status_figures(document, arguments.folder, runs_of(arguments.folder, document))
     print(json_text(figures) if arguments.json else status_text(figures, arguments.each))
     return Exit.GOOD
@@ -27,19 +26,19 @@ def status(arguments: argparse.Namespace) -> Exit:
 def retry(arguments: argparse.Namespace) -> Exit:
     """Let the next `run` repeat runs that failed or were cancelled."""
     chosen = _chosen(arguments)
-    wanted = [run for run in chosen if run.shown_status().state in ("failed", "cancelled")]
+    wanted = [run for run in chosen if run.shown_status.state in ("failed", "cancelled")]
     return _tell(arguments, "waiting", wanted, {run.id for run in wanted if work.retry(run)})
 
 
 def cancel(arguments: argparse.Namespace) -> Exit:
     """Give up runs that have not ended."""
-    wanted = [run for run in _chosen(arguments) if run.shown_status().state in ("waiting", "running")]
+    wanted = [run for run in _chosen(arguments) if run.shown_status.state in ("waiting", "running")]
     for run in wanted:
         work.cancel(run)
     return _tell(arguments, "cancelled", wanted, {run.id for run in wanted})
 
 
-def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed: set[str]) -> Exit:
+def _tell(arguments: argparse.Namespace, state: str, wanted: list[PlannedRun], changed: set[str]) -> Exit:
     """Say what became of wishes for runs."""
     missed = [run for run in wanted if run.id not in changed]
     if arguments.json:
@@ -48,14 +47,14 @@ def _tell(arguments: argparse.Namespace, state: str, wanted: list[Run], changed:
         print(f"{counted(len(changed), 'run')} {state}")
         for run in missed:
             print(
-                f"{run.label} ({run.id}): {worker_of(run.path) or 'a process'} is working on it",
+                f"{run.label} ({run.id}): {run.worker or 'a process'} is working on it",
                 file=sys.stderr,
             )
     return Exit.FINDINGS if missed else Exit.GOOD
 
 
-def _chosen(arguments: argparse.Namespace) -> list[Run]:
-    document = kept(arguments.folder)
+def _chosen(arguments: argparse.Namespace) -> list[PlannedRun]:
+    document = read_experiment(arguments.folder)
     runs = runs_of(arguments.folder, document)
     if not arguments.runs:
         return runs

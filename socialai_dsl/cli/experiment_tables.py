@@ -5,15 +5,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from socialai_dsl.errors import UnreadableError
 from socialai_dsl.experiments.estimate import Speeds
-from socialai_dsl.experiments.folder import Run, UnreadableError
+from socialai_dsl.experiments.folder import PlannedRun
 
 _STATES: Final = ("done", "running", "waiting", "failed", "cancelled")
 _MESSAGES_SHOWN: Final = 10
 
 
 def plan_figures(
-    document: Mapping[str, Any], folder: Path, runs: Sequence[Run], speeds: Speeds, workers: int
+    document: Mapping[str, Any], folder: Path, runs: Sequence[PlannedRun], speeds: Speeds, workers: int
 ) -> dict[str, Any]:
     """The plan: each run with its state and the seconds left, and the sum.
 
@@ -45,7 +46,7 @@ def plan_figures(
     }
 
 
-def seconds_left(runs: Sequence[Run], left: Sequence[Run]) -> float | None:
+def seconds_left(runs: Sequence[PlannedRun], left: Sequence[PlannedRun]) -> float | None:
     """The seconds left of some runs, one after the other; None if the speed of one is unknown.
 
     Args:
@@ -58,14 +59,14 @@ def seconds_left(runs: Sequence[Run], left: Sequence[Run]) -> float | None:
     return sum(known) if len(known) == len(times) else None
 
 
-def _remaining(speeds: Speeds, run: Run) -> float | None:
+def _remaining(speeds: Speeds, run: PlannedRun) -> float | None:
     try:
         return speeds.remaining(run)
     except (OSError, UnreadableError):
         return 0.0  # such a run is not worked on
 
 
-def status_figures(document: Mapping[str, Any], folder: Path, runs: Sequence[Run]) -> dict[str, Any]:
+def status_figures(document: Mapping[str, Any], folder: Path, runs: Sequence[PlannedRun]) -> dict[str, Any]:
     """How far each run is."""
     rows = _rows(document, runs)
     return {**_head(document, folder), "states": dict(Counter(row["state"] for row in rows)), "runs": rows}
@@ -75,19 +76,19 @@ def _head(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return {"name": document["name"], "profile": document["profile"], "folder": str(folder)}
 
 
-def _rows(document: Mapping[str, Any], runs: Sequence[Run]) -> list[dict[str, Any]]:
+def _rows(document: Mapping[str, Any], runs: Sequence[PlannedRun]) -> list[dict[str, Any]]:
     conditions: dict[str, list[str]] = {}
     for entry in document["runs"]:
         conditions.setdefault(entry["id"], []).append(entry["condition"])
     return [_row(run, conditions[run.id]) for run in runs]
 
 
-def _row(run: Run, conditions: Sequence[str]) -> dict[str, Any]:
-    status = run.shown_status()
+def _row(run: PlannedRun, conditions: Sequence[str]) -> dict[str, Any]:
+    status = run.shown_status
     done, success = 0, None
     try:
-        result = run.result()
-        metrics = run.last_metrics() if run.condition["frames"] else None
+        result = run.result
+        metrics = run.last_metrics if run.condition["frames"] else None
         done = int((result or metrics or {}).get("frames", 0))
         success = result["eval"]["success_rate"] if result else None
     except (OSError, UnreadableError):

@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.atomic import read_json
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import LOCK_FILES, RESULT, only_writer, read_json, scenario_folder_name
+from socialai_dsl.runs.folder import FILM, LOCK_FILES, RESULT, only_writer, scenario_folder_name
 
 if TYPE_CHECKING:
     from trainer.config import RunConfig
 
 SUMMARY: Final = "make a folder of a trained agent to give to others"
-_FILM: Final = "episode.gif"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,8 +45,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     with only_writer(out):
         if any(file.name not in LOCK_FILES for file in out.iterdir()):
             raise UsageError(f"--out: {out} is there already; choose another folder")
-        if (run / _FILM).is_file():
-            shutil.copyfile(run / _FILM, out / _FILM)
+        if (run / FILM).is_file():
+            shutil.copyfile(run / FILM, out / FILM)
         write_agent(out, config, loaded, checkpoint, read_json(run / RESULT))
     print(f"written to {out}; try it: socialai evaluate {out}")
     return Exit.GOOD

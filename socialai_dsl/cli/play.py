@@ -9,7 +9,7 @@ from socialai_dsl.cli.arguments import identifier, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.evaluation.players import HUMAN_FOLDER, session_folder
-from socialai_dsl.run_folder import scenario_folder_name
+from socialai_dsl.runs.folder import scenario_folder_name
 
 SUMMARY: Final = "play a scenario in the terminal"
 

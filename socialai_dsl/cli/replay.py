@@ -6,11 +6,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.cli.arguments import episode, episodes, positive, refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import counted
 from socialai_dsl.errors import UsageError, first_mistake
-from socialai_dsl.run_folder import REPLAY, SETTINGS, read_json, write_text
+from socialai_dsl.runs.folder import CONFIG, REPLAY
 
 if TYPE_CHECKING:
     from socialai_dsl.evaluation.testing import Evaluation
@@ -148,13 +149,13 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
 
     source = arguments.source
     folder = folder_of(source)
-    if (folder / SETTINGS).is_file():
+    if (folder / CONFIG).is_file():
         if arguments.agent is not None:
             raise UsageError(
                 "--agent: a run is replayed by its own agent; name a scenario to let another play"
             )
         agent, scenario = source, own_scenario(source)
-        played_by = str(read_json(folder / SETTINGS).get("agent"))
+        played_by = str(read_json(folder / CONFIG).get("agent"))
         if played_by == "human" or played_by.startswith(MODEL_PREFIX):
             refuse(arguments, ("greedy",), f"the agent {played_by!r} has played already")
         if played_by == "human":

@@ -5,11 +5,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.curves import draw_curves
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import only_writer, write_text
+from socialai_dsl.runs.folder import only_writer
 
 if TYPE_CHECKING:
     from socialai_dsl.baselines import Baselines

@@ -5,17 +5,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import json_text
-from socialai_dsl.run_folder import (
-    REPLAY,
-    RESULT,
-    SETTINGS,
-    new_run_folder,
-    only_writer,
-    versions,
-    write_json,
-)
+from socialai_dsl.runs.folder import CONFIG, REPLAY, RESULT, new_run_folder, only_writer
+from socialai_dsl.runs.versions import versions
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded
@@ -90,7 +84,7 @@ def _run(
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
     agent, training = config.agent, _NOT_TRAINED
-    write_json(folder / SETTINGS, config.model_dump())
+    write_json(folder / CONFIG, config.model_dump())
     print(
         f"{arguments.scenario or config.scenario}: {_size(program)}; writing to {folder}",
         file=stream,

@@ -15,7 +15,7 @@ from socialai_dsl.cli.arguments import whole_number
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.settings import resolved_config
-from socialai_dsl.run_folder import read_config
+from socialai_dsl.runs.folder import read_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 
 _AUTOMATIC: Final = {

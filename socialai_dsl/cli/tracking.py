@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from trainer.logging import FILE_NAME
+from socialai_dsl.runs.folder import METRICS
 
 _ID_FILE = "wandb_id.txt"
 
@@ -91,7 +91,7 @@ class WandbTracker:
             self._run = None
             warnings.warn(
                 f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
-                f"{self.run_dir / FILE_NAME}",
+                f"{self.run_dir / METRICS}",
                 TrackingWarning,
                 stacklevel=2,
             )

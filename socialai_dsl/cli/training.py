@@ -9,20 +9,34 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
 import socialai_dsl
+from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.cli.learnt import Learnt
 from socialai_dsl.cli.progress import TrainingProgress
 from socialai_dsl.cli.stopping import Stop
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import RunFailed, UsageError
-from socialai_dsl.evaluation.model_card import FILE, model_card
+from socialai_dsl.evaluation.model_card import model_card
 from socialai_dsl.evaluation.scripts import script_of, with_script
 from socialai_dsl.evaluation.testing import Evaluation
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
-from socialai_dsl.run_folder import LOCK_FILES, REPLAY, SETTINGS, scenario_folder_name, write_text
+from socialai_dsl.runs.folder import (
+    CARD,
+    CHECKPOINTS,
+    CONFIG,
+    CURVE,
+    FAILURE,
+    FILM,
+    LOCK_FILES,
+    METRICS,
+    REPLAY,
+    TRANSCRIPT,
+    scenario_folder_name,
+)
 from trainer.config import RunConfig
+from trainer.files import checkpoint_files
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.tracking import WandbTracker
@@ -35,13 +49,11 @@ def discard_unstarted(folder: Path, copied: Iterable[Path]) -> None:
         folder: of the run.
         copied: what was copied into it, which is removed.
     """
-    from trainer.checkpoint import FOLDER
-
-    checkpoints = folder / FOLDER
-    if not any(checkpoints.glob("*.safetensors")):
+    checkpoints = folder / CHECKPOINTS
+    if not checkpoint_files(checkpoints):
         for copy in copied:
             shutil.rmtree(copy) if copy.is_dir() else copy.unlink()
-        for file in (SETTINGS, *LOCK_FILES):
+        for file in (CONFIG, *LOCK_FILES):
             (folder / file).unlink(missing_ok=True)
         for empty in (checkpoints, folder):
             with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
@@ -50,7 +62,7 @@ def discard_unstarted(folder: Path, copied: Iterable[Path]) -> None:
 
 def training_figures(folder: Path) -> dict[str, Any]:
     """Frames, seconds and speed of the whole run, all its parts together if it was resumed."""
-    lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+    lines = (folder / METRICS).read_text(encoding="utf-8").splitlines()
     seconds, frames = 0.0, 0
     for row in map(json.loads, lines):
         seconds += (row["frames"] - frames) / row["frames_per_second"]
@@ -153,9 +165,9 @@ def draw_curve(config: RunConfig, folder: Path, result: dict[str, Any]) -> None:
     from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
-    curve = read_curve(folder / "metrics.jsonl", result["eval"]["endings"], test)
+    curve = read_curve(folder / METRICS, result["eval"]["endings"], test)
     title = f"{scenario_folder_name(config.scenario)}, {config.agent}, seed {config.seed}"
-    draw_learning_curve(curve, title, folder / "learning_curve.png")
+    draw_learning_curve(curve, title, folder / CURVE)
 
 
 def write_card(
@@ -163,7 +175,7 @@ def write_card(
 ) -> None:
     """Write the model card of a run into its folder."""
     place = weights.relative_to(folder).as_posix()
-    write_text(folder / FILE, model_card(config.within(Path()), result, about_of(loaded), ".", place))
+    write_text(folder / CARD, model_card(config.within(Path()), result, about_of(loaded), ".", place))
 
 
 _REPLAYED: Final = 5
@@ -177,10 +189,10 @@ def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     """
     write_text(folder / REPLAY, replay_page(evaluation.traces(evaluation.to_replay(_REPLAYED))))
     success = evaluation.result.success
-    shown = {"episode": int(success.argmax())}
+    shown = {(FILM, TRANSCRIPT): int(success.argmax())}
     if success.any() and not success.all():
-        shown["failure"] = int(success.argmin())
-    for name, number in shown.items():
+        shown[f"{FAILURE}.gif", f"{FAILURE}.txt"] = int(success.argmin())
+    for (film, transcript), number in shown.items():
         episode = evaluation.record(number, label)
-        write_text(folder / ("transcript.txt" if name == "episode" else f"{name}.txt"), episode.transcript())
-        episode.save_film(folder / f"{name}.gif")
+        write_text(folder / transcript, episode.transcript())
+        episode.save_film(folder / film)

@@ -15,7 +15,7 @@ from socialai_dsl.evaluation.model_card import model_card
 from socialai_dsl.evaluation.scripts import script_of
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
-from socialai_dsl.run_folder import RESULT, SETTINGS, read_config
+from socialai_dsl.runs.folder import CONFIG, RESULT, read_config
 from trainer.config import SCENARIO_FOLDER, RunConfig, scenario_in
 from trainer.shipped import WEIGHTS
 
@@ -85,7 +85,7 @@ def write_agent(
     write_json(out / VOCABULARY, words)
     result = moved.told({**result, "scenario": moved.scenario})
     write_text(out / CARD, model_card(written, result, about_of(loaded), agent, WEIGHTS))
-    write_json(out / SETTINGS, written.model_dump())
+    write_json(out / CONFIG, written.model_dump())
     write_json(out / RESULT, result)  # last, so that its presence means a complete folder
 
 

@@ -26,7 +26,7 @@ from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.questions import score
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import Ending
-from socialai_dsl.run_folder import scenario_folder_name
+from socialai_dsl.runs.folder import scenario_folder_name
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint

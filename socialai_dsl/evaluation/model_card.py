@@ -8,11 +8,10 @@ import yaml
 
 from socialai_dsl.evaluation.summary import ending_rows, summary_rows
 from socialai_dsl.experiments.arguments import typed
-from socialai_dsl.run_folder import scenario_folder_name
+from socialai_dsl.runs.folder import scenario_folder_name
 from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
 from trainer.shipped import PREFIX
 
-FILE: Final = "model_card.md"
 # Options that change where and how a run is made, not what it learns.
 _NOT_REPEATED: Final = ("agent", "device", "eval_episodes", "wandb", "checkpoint_every", "keep_checkpoints")
 # Options with a row of their own in the card, or that say nothing about the agent.

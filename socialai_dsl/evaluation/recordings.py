@@ -4,9 +4,10 @@ import csv
 import io
 from pathlib import Path
 
+from socialai_dsl.atomic import write_text
 from socialai_dsl.evaluation.testing import Evaluation
 from socialai_dsl.replay.page import replay_page
-from socialai_dsl.run_folder import EPISODES, REPLAY, only_writer, scenario_folder_name, write_text
+from socialai_dsl.runs.folder import EPISODES, REPLAY, only_writer, scenario_folder_name
 
 
 def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from socialai_dsl.run_folder import RESULT
+from socialai_dsl.runs.folder import RESULT
 
 _NUMBERS_SHOWN: Final = 8
 _RULES_SHOWN: Final = 12

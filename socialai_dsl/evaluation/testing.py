@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import socialai_dsl
+from socialai_dsl.atomic import read_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import scenarios_of
@@ -26,7 +27,7 @@ from socialai_dsl.replay.document import Outcome
 from socialai_dsl.replay.endings import Ending, endings_of, short_name
 from socialai_dsl.replay.film import RecordedEpisode, record
 from socialai_dsl.replay.tracing import Think
-from socialai_dsl.run_folder import SETTINGS, read_json, scenario_folder_name
+from socialai_dsl.runs.folder import CONFIG, scenario_folder_name
 from trainer.config import scenario_in
 
 if TYPE_CHECKING:  # it needs Textual
@@ -353,9 +354,9 @@ def own_scenario(agent: str) -> str:
         UsageError: it is neither.
     """
     run = folder_of(agent)
-    if not (run / SETTINGS).is_file():
+    if not (run / CONFIG).is_file():
         raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
-    scenario = read_json(run / SETTINGS).get("scenario")
+    scenario = read_json(run / CONFIG).get("scenario")
     if not isinstance(scenario, str):
-        raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")
+        raise UsageError(f"{run / CONFIG}: scenario: expected a text, got {scenario!r}")
     return scenario_in(run, scenario)

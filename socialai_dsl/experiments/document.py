@@ -10,11 +10,11 @@ from typing import Any, Final
 
 from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere, is_phases
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.experiments.folder import CHECKPOINTS
 from socialai_dsl.experiments.settings import resolved_config
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
 from trainer.config import WITHOUT_EFFECT, RunConfig
+from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.shipped import PREFIX, located
 
 FORMAT: Final = 1
@@ -237,7 +237,7 @@ def _weights_digest(path: Path) -> str:
     """Of a checkpoint's file: the newest of a run's folder or of a folder of checkpoints."""
     file = path
     if path.is_dir():
-        files = sorted(path.glob("*.safetensors")) or sorted((path / CHECKPOINTS).glob("*.safetensors"))
+        files = checkpoint_files(path) or checkpoint_files(path / CHECKPOINTS)
         if not files:
             raise FileNotFoundError(2, "there is no checkpoint in this folder", str(path))
         file = files[-1]

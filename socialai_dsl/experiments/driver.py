@@ -7,8 +7,9 @@ from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import Final
 
+from socialai_dsl.errors import UnreadableError, described_error
 from socialai_dsl.experiments.engines import Engine, Handle
-from socialai_dsl.experiments.folder import Run, UnreadableError, said_of, worker_of
+from socialai_dsl.experiments.folder import PlannedRun
 from socialai_dsl.experiments.work import End, Outcome, finished
 
 SECONDS_BETWEEN_LOOKS: Final = 0.2
@@ -16,7 +17,10 @@ SECONDS_BEFORE_ASKING_AGAIN: Final = 2.0
 
 
 def drive(
-    folder: Path, runs: Sequence[Run], engine: Engine, ended: Callable[[Run, Outcome, str], None]
+    folder: Path,
+    runs: Sequence[PlannedRun],
+    engine: Engine,
+    ended: Callable[[PlannedRun, Outcome, str], None],
 ) -> Generator[None, None, None]:
     """Work on runs until each has come to an end; yields several times a second, so that the caller can look around.
 
@@ -26,7 +30,7 @@ def drive(
         engine: who works on them; stopped when the iterator is closed.
         ended: told of each run that has come to its end.
     """
-    waiting, work = {run.id: run for run in runs}, dict[str, tuple[Run, Handle]]()
+    waiting, work = {run.id: run for run in runs}, dict[str, tuple[PlannedRun, Handle]]()
     ask_again = time.monotonic()
     try:
         while work or waiting:
@@ -54,12 +58,12 @@ def drive(
         engine.stop()
 
 
-def _known(run: Run) -> End | None:
+def _known(run: PlannedRun) -> End | None:
     """What came of a run, or that another command works on it; None if it is to be given to the engine."""
     try:
-        return finished(run) or ((Outcome.HELD, "") if worker_of(run.path) is not None else None)
+        return finished(run) or ((Outcome.HELD, "") if run.worker is not None else None)
     except (OSError, UnreadableError) as error:
-        return Outcome.FAILED, said_of(error)
+        return Outcome.FAILED, described_error(error)
 
 
 def _outcome(handle: Handle) -> End:

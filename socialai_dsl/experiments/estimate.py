@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.atomic import write_json
-from socialai_dsl.experiments.folder import Run, UnreadableError
+from socialai_dsl.errors import UnreadableError
+from socialai_dsl.experiments.folder import PlannedRun
 
 USUAL_SPEEDS: Final[Mapping[str, float]] = {"fast": 5000.0}
 """Frames per second of a network on a core of a server, where nothing was measured; of others nothing is known."""
@@ -35,7 +36,7 @@ class Speeds:
         seconds_besides: what a run takes besides training.
     """
 
-    def __init__(self, runs: Iterable[Run]) -> None:
+    def __init__(self, runs: Iterable[PlannedRun]) -> None:
         """Learn from the runs of an experiment that have got far enough to tell."""
         self._by_scenario: dict[tuple[str, str], list[float]] = {}
         self._by_net: dict[str, list[float]] = {}
@@ -72,16 +73,16 @@ class Speeds:
         """Take note of what was measured in the meantime."""
         self._cached = _cached()
 
-    def remaining(self, run: Run) -> float | None:
+    def remaining(self, run: PlannedRun) -> float | None:
         """Seconds that a run still takes; None if the speed is not known."""
-        if run.result() is not None:
-            return self.seconds_besides if run.missing_tests() else 0.0
+        if run.result is not None:
+            return self.seconds_besides if run.missing_tests else 0.0
         if run.condition["frames"] is None:
             return self.seconds_besides
         speed = self.of(run.condition)
         if speed is None:
             return None
-        left: int = run.condition["frames"] - (run.checkpoint_frames() or 0)
+        left: int = run.condition["frames"] - (run.checkpoint_frames or 0)
         return max(0, left) / speed.frames_per_second + self.seconds_besides
 
 
@@ -106,20 +107,20 @@ def _cached() -> dict[str, float]:
     return {net: float(speed) for net, speed in known if isinstance(speed, int | float) and speed > 0}
 
 
-def _speed_of(run: Run) -> float | None:
+def _speed_of(run: PlannedRun) -> float | None:
     try:
-        result = run.result()
+        result = run.result
     except (OSError, UnreadableError):
         return None
-    row = result or run.last_metrics() or {}
+    row = result or run.last_metrics or {}
     speed: object = row.get("frames_per_second")
     return float(speed) if isinstance(speed, int | float) and speed > 0 else None
 
 
-def _seconds_besides(run: Run) -> list[float]:
+def _seconds_besides(run: PlannedRun) -> list[float]:
     """The time that a run's processes took without training, if the run is done."""
     try:
-        result, status = run.result(), run.status()
+        result, status = run.result, run.status
     except (OSError, UnreadableError):
         return []
     if status.state != "done" or result is None or "train_seconds" not in result:

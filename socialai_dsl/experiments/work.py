@@ -15,20 +15,13 @@ from pathlib import Path
 from typing import IO, Final
 
 from socialai_dsl.atomic import write_json
+from socialai_dsl.errors import UnreadableError, described_error
 from socialai_dsl.experiments.arguments import typed
-from socialai_dsl.experiments.folder import (
-    CANCEL,
-    CHECKPOINTS,
-    TESTS,
-    Run,
-    State,
-    Status,
-    UnreadableError,
-    read_experiment,
-    runs_of,
-    said_of,
-)
-from socialai_dsl.folder_lock import HeldError
+from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
+from socialai_dsl.runs.folder import CANCEL, CHECKPOINTS, CONFIG, TESTS
+from socialai_dsl.runs.lock import HeldError
+from socialai_dsl.runs.status import State, Status
+from trainer.files import checkpoint_files
 
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
@@ -81,51 +74,48 @@ def perform(folder: Path, run_id: str, stop: Stop = lambda: False) -> End:
         What came of it. Errors of the run and of its folder are no exceptions: they stop this run, and no other.
     """
     try:
-        document = read_experiment(folder)
-        if document is None:
-            raise UnreadableError(f"{folder}: this is no experiment's folder")
-        run = next(run for run in runs_of(folder, document) if run.id == run_id)
+        run = next(run for run in runs_of(folder, read_experiment(folder)) if run.id == run_id)
         return finished(run) or _performed_alone(run, stop)
     except (OSError, UnreadableError) as error:
-        return Outcome.FAILED, said_of(error)
+        return Outcome.FAILED, described_error(error)
 
 
-def finished(run: Run) -> End | None:
+def finished(run: PlannedRun) -> End | None:
     """What came of a run that has come to its end; None if there is something left to do.
 
     Raises:
         OSError, UnreadableError: its folder does not tell.
     """
-    status = run.status()
-    if status.state == "done" and not run.missing_tests():
+    status = run.status
+    if status.state == "done" and not run.missing_tests:
         return Outcome.DONE, ""
     if status.state in ("failed", "cancelled"):
         return Outcome(status.state), status.message or ""
     return None
 
 
-def cancel(run: Run) -> None:
+def cancel(run: PlannedRun) -> None:
     """Give a run up: at once if no process works on it, else by the worker, which lets it save first."""
-    run.path.mkdir(parents=True, exist_ok=True)
-    (run.path / CANCEL).touch()
+    run.folder.mkdir(parents=True, exist_ok=True)
+    (run.folder / CANCEL).touch()
     _settle(run, "cancelled")
 
 
-def retry(run: Run) -> bool:
+def retry(run: PlannedRun) -> bool:
     """Let a run that failed or was cancelled wait again; False if a process works on it."""
-    (run.path / CANCEL).unlink(missing_ok=True)
+    (run.folder / CANCEL).unlink(missing_ok=True)
     return _settle(run, "waiting")
 
 
-def _settle(run: Run, state: State) -> bool:
+def _settle(run: PlannedRun, state: State) -> bool:
     """Change the state of a run that no process works on; whether that was so."""
     try:
-        with run.lock():
+        with run.worker_lock():
             try:
-                status = run.status()
+                status = run.status
             except UnreadableError:
                 status = Status()  # what it said is lost; what the run has computed is not
-            status.end("its process was gone", run.last_sign())
+            status.end("its process was gone", run.last_sign)
             status.state, status.message = state, None
             run.write_status(status)
     except HeldError:
@@ -133,10 +123,10 @@ def _settle(run: Run, state: State) -> bool:
     return True
 
 
-def _performed_alone(run: Run, stop: Stop) -> End:
-    run.path.mkdir(parents=True, exist_ok=True)
+def _performed_alone(run: PlannedRun, stop: Stop) -> End:
+    run.folder.mkdir(parents=True, exist_ok=True)
     try:
-        with run.lock():
+        with run.worker_lock():
             # It may have come to its end, or been given up, just before it was ours.
             return finished(run) or _Work(run, stop).perform()
     except HeldError:
@@ -146,7 +136,7 @@ def _performed_alone(run: Run, stop: Stop) -> End:
 class _Work:
     """Work on one run; the caller holds its lock."""
 
-    def __init__(self, run: Run, stop: Stop) -> None:
+    def __init__(self, run: PlannedRun, stop: Stop) -> None:
         self._run = run
         self._stop = stop
         self._status = Status()
@@ -154,8 +144,8 @@ class _Work:
 
     def perform(self) -> End:
         """Train, test, and write down what came of it."""
-        self._status = self._run.status()
-        self._status.end("its process was gone", self._run.last_sign())
+        self._status = self._run.status
+        self._status.end("its process was gone", self._run.last_sign)
         try:
             self._train()
             self._test()
@@ -182,12 +172,12 @@ class _Work:
     def _train(self) -> None:
         """Train if the agent is to be trained, and play its own test set."""
         died_at: list[int] = []
-        while self._run.result() is None:
+        while self._run.result is None:
             crash = self._process(self._run_command())
             if crash is None:
-                assert self._run.result() is not None, "internal: a run that ended well has no result"
+                assert self._run.result is not None, "internal: a run that ended well has no result"
                 return
-            died_at.append(self._run.checkpoint_frames() or 0)
+            died_at.append(self._run.checkpoint_frames or 0)
             if died_at[-_CRASHES_IN_PLACE:] == [died_at[-1]] * _CRASHES_IN_PLACE:
                 raise _FailedError(
                     f"{crash}, {_CRASHES_IN_PLACE} times after {died_at[-1]:,} frames; was there too little memory?"
@@ -196,7 +186,7 @@ class _Work:
 
     def _test(self) -> None:
         """Play the other scenarios."""
-        missing = self._run.missing_tests()
+        missing = self._run.missing_tests
         if not missing:
             return
         self._status.end("trained")
@@ -212,16 +202,12 @@ class _Work:
             output.seek(0)
             found = json.loads(output.read())
         figures = {name: entry["eval"] for name, entry in zip(missing, found, strict=True)}
-        write_json(self._run.path / TESTS, self._run.tested() | figures)
+        write_json(self._run.folder / TESTS, self._run.tested | figures)
 
     def _run_command(self) -> list[str]:
-        path, condition = self._run.path, self._condition
-        config = path / "config.json"
-        if (
-            condition["agent"] == "ppo"
-            and config.exists()
-            and any((path / CHECKPOINTS).glob("*.safetensors"))
-        ):
+        path, condition = self._run.folder, self._condition
+        config = path / CONFIG
+        if condition["agent"] == "ppo" and config.exists() and checkpoint_files(path / CHECKPOINTS):
             return ["run", "--resume", str(path), "--json"]
         config.unlink(missing_ok=True)  # of a process that was killed before there was anything to resume
         command = ["run", condition["scenario"], "--agent", condition["agent"], "--seed", str(self._run.seed)]
@@ -234,7 +220,7 @@ class _Work:
 
     def _test_command(self, scenarios: Sequence[str]) -> list[str]:
         condition, options = self._condition, self._condition["options"]
-        agent = str(self._run.path) if condition["agent"] == "ppo" else condition["agent"]
+        agent = str(self._run.folder) if condition["agent"] == "ppo" else condition["agent"]
         command = [
             "evaluate",
             agent,
@@ -243,7 +229,7 @@ class _Work:
         ]
         if agent not in _WITHOUT_NETWORK:
             command += ["--device", options["device"]]
-        if agent not in ("oracle", str(self._run.path)):
+        if agent not in ("oracle", str(self._run.folder)):
             command += ["--seed", str(self._run.seed)]
         if ":" in str(options.get("net", "")):
             command += ["--net", options["net"]]
@@ -263,7 +249,7 @@ class _Work:
             child = self._start(arguments, output, said)
             try:
                 # What training starts from; testing starts where training ended.
-                self._status.begin(child.pid, self._run.checkpoint_frames() or 0)
+                self._status.begin(child.pid, self._run.checkpoint_frames or 0)
                 self._run.write_status(self._status)
                 self._wait(child)
             finally:
@@ -298,7 +284,7 @@ class _Work:
     def _heed_wishes(self) -> None:
         if self._stop():
             raise _StoppedError
-        if self._run.is_cancelled():
+        if self._run.is_cancelled:
             raise _CancelledError
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from socialai_dsl.baselines import Baselines, Level
-from socialai_dsl.reporting.collect import Condition, Experiment, Run
+from socialai_dsl.reporting.collect import Condition, Experiment, RunRecord
 from socialai_dsl.reporting.records import EndingRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
@@ -256,7 +256,7 @@ def pair_by_room(first: Summary, second: Summary) -> dict[str, Any] | None:
 
     The same number is the same room only in the same program.
     """
-    runs: list[Run] = [*first.condition.done, *second.condition.done]
+    runs: list[RunRecord] = [*first.condition.done, *second.condition.done]
     rooms = pd.concat([first.condition.rooms, second.condition.rooms], axis=1, join="inner")
     if len({run.result.program_sha256 for run in runs if run.result is not None}) != 1 or rooms.empty:
         return None
@@ -313,7 +313,7 @@ def _place(condition: Condition) -> dict[str, Any]:
     return {"condition": entry.name, **named}
 
 
-def _run(condition: Condition, run: Run) -> dict[str, Any]:
+def _run(condition: Condition, run: RunRecord) -> dict[str, Any]:
     figures, result = run.figures, run.result
     told = figures.model_dump() if figures else {}
     return {

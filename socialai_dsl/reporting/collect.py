@@ -17,30 +17,20 @@ from typing import Any, Final, TypeVar
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-from socialai_dsl.experiments.folder import (
-    EPISODES,
-    EXPERIMENT,
-    LOCK,
-    METRICS,
-    RESULT,
-    RUNS,
-    STATUS,
-    TESTS,
-    worker_of,
-)
+from socialai_dsl.experiments.folder import RUNS
+from socialai_dsl.experiments.folder import read_experiment as read_document
+from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, RunEntry
 from socialai_dsl.reporting.records import (
-    ConditionEntry,
-    ExperimentRecord,
     Figures,
     ResultRecord,
-    RunEntry,
     StartRecord,
     StatusRecord,
     UpdateRecord,
     described,
 )
 from socialai_dsl.reporting.seeds import read_updates
-from trainer.config import HYPER, SCENARIO_FOLDER, RunConfig, configure, scenario_in
+from socialai_dsl.runs.folder import CONFIG, EPISODES, METRICS, RESULT, SCENARIO, STARTS, STATUS, TESTS, Run
+from trainer.config import HYPER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
 
@@ -51,7 +41,7 @@ _SETTINGS: Final = TypeAdapter(dict[str, Any])
 
 
 @dataclass(frozen=True)
-class Run:
+class RunRecord:
     """A run, as far as it came.
 
     Attributes:
@@ -97,10 +87,10 @@ class Condition:
     """Runs that differ in nothing but their seed."""
 
     entry: ConditionEntry
-    runs: tuple[Run, ...]
+    runs: tuple[RunRecord, ...]
 
     @property
-    def done(self) -> tuple[Run, ...]:
+    def done(self) -> tuple[RunRecord, ...]:
         """The runs that have a result."""
         return tuple(run for run in self.runs if run.result is not None)
 
@@ -133,7 +123,7 @@ class Experiment:
         return list(dict.fromkeys(condition.entry.scenario for condition in self.conditions))
 
     @property
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[RunRecord]:
         """All runs, each once, also where several conditions have it."""
         return list({run.id: run for condition in self.conditions for run in condition.runs}.values())
 
@@ -143,21 +133,11 @@ def read_experiment(folder: Path) -> Experiment:
 
     Raises:
         OSError: `experiment.json` cannot be read.
-        ValueError: it is damaged, or of another format.
+        UnreadableError: there is none, or it is damaged or of another format.
     """
-    path = folder / EXPERIMENT
-    try:
-        record = ExperimentRecord.model_validate_json(path.read_bytes())
-    except ValidationError as error:
-        raise ValueError(f"{path}: {described(error)}") from None
+    record = ExperimentRecord.model_validate(read_document(folder))
     entries: dict[str, list[RunEntry]] = {entry.name: [] for entry in record.conditions}
     for run in record.runs:
-        if run.condition not in entries:
-            raise ValueError(
-                f"{path}: run {run.id!r} is of the condition {run.condition!r}, which is not listed"
-            )
-        if run.id == ".." or Path(run.id).name != run.id:
-            raise ValueError(f"{path}: run {run.id!r}: expected the name of a folder in {RUNS}")
         entries[run.condition].append(run)
     conditions = tuple(
         Condition(
@@ -174,12 +154,12 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     Raises:
         ValueError: a folder is not that of a run.
     """
-    grouped: dict[tuple[str, str, str], list[tuple[dict[str, Any], Run]]] = {}
+    grouped: dict[tuple[str, str, str], list[tuple[dict[str, Any], RunRecord]]] = {}
     called = [folder.name for folder in folders]
     for folder in folders:
         settings = _settings(folder, [])
         if settings is None or not isinstance(settings.get("scenario"), str):
-            raise ValueError(f"{folder}: expected the folder of a run, with its config.json")
+            raise ValueError(f"{folder}: expected the folder of a run, with its {CONFIG}")
         seed = settings.get("seed")
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
@@ -188,7 +168,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     conditions = []
     for (scenario, digest, column), members in grouped.items():
         settings, first = members[0]
-        row = scenario.removeprefix(f"{SCENARIO_FOLDER}/")
+        row = scenario.removeprefix(f"{SCENARIO}/")
         if sum(key[::2] == (scenario, column) for key in grouped) > 1:
             row += f" ({digest[:6]})"  # another file of the same name
         frames = settings.get("frames")
@@ -211,7 +191,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
 def _scenario_digest(folder: Path) -> str:
     """Of the scenario's files that the folder keeps, which tells scenarios apart whose files have one name."""
     digest = hashlib.sha256()
-    for file in sorted((folder / SCENARIO_FOLDER).rglob("*.y*ml")):
+    for file in sorted((folder / SCENARIO).rglob("*.y*ml")):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
 
@@ -238,15 +218,15 @@ def unusual(settings: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _read_run(folder: Path, name: str, seed: int) -> Run:
+def _read_run(folder: Path, name: str, seed: int) -> RunRecord:
     if not folder.is_dir():
-        return Run(name, seed, folder, "missing")
+        return RunRecord(name, seed, folder, "missing")
     problems: list[str] = []
     status = _read(folder / STATUS, _STATUS, problems)
     result = _read(folder / RESULT, _RESULT, problems)
     settings = _settings(folder, problems)
     frames = result.frames if result is not None else _frames_so_far(folder / METRICS, problems)
-    return Run(
+    return RunRecord(
         name,
         seed,
         folder,
@@ -257,7 +237,7 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
         tests=_read(folder / TESTS, _TESTS, problems) or {},
         frames=frames,
         digest=_digest(settings) if settings is not None else "",
-        starts=_starts(folder / "starts.jsonl"),
+        starts=_starts(folder / STARTS),
         problems=tuple(problems),
     )
 
@@ -265,7 +245,7 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
 def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
     """What the status says, unless whoever wrote it is gone; without a status, what the files tell."""
     if status is not None:
-        is_left = status.state == "running" and (folder / LOCK).exists() and worker_of(folder) is None
+        is_left = status.state == "running" and Run(folder).was_left
         return "stopped" if is_left else status.state
     if result is not None:
         return "done"
@@ -303,9 +283,9 @@ def _rooms(path: Path, problems: list[str]) -> pd.Series:
 
 def _settings(folder: Path, problems: list[str]) -> dict[str, Any] | None:
     found: list[str] = []
-    settings = _read(folder / "config.json", _SETTINGS, found)
+    settings = _read(folder / CONFIG, _SETTINGS, found)
     if settings is None:
-        problems.append("config.json is missing or damaged")
+        problems.append(f"{CONFIG} is missing or damaged")
     return settings
 
 

@@ -20,7 +20,6 @@ import pandas as pd
 from markupsafe import Markup
 
 from socialai_dsl.baselines import Baselines, Level
-from socialai_dsl.experiments.folder import REPLAY
 from socialai_dsl.reporting.analysis import (
     RISING,
     SOLVED,
@@ -29,10 +28,11 @@ from socialai_dsl.reporting.analysis import (
     Section,
     Summary,
 )
-from socialai_dsl.reporting.collect import Run
+from socialai_dsl.reporting.collect import RunRecord
 from socialai_dsl.reporting.records import Reference
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
+from socialai_dsl.runs.folder import REPLAY
 
 _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
 _NONE: Final = "–"
@@ -166,7 +166,7 @@ def _agrees(success: pd.Series, reference: Reference) -> bool:
     return bool(abs(success.mean() - reference.mean) <= (0.05 if reference.std is None else reference.std))
 
 
-def _state_of(run: Run) -> str:
+def _state_of(run: RunRecord) -> str:
     if run.state == "done" and run.result is None:
         return "without a result"
     return "not begun" if run.state == "missing" else run.state
@@ -412,7 +412,7 @@ def _runs(analysis: Analysis, place: Path) -> Rows:
     ]
 
 
-def _replay(run: Run, place: Path) -> str:
+def _replay(run: RunRecord, place: Path) -> str:
     """A link to the page on which episodes of a run can be watched."""
     page = run.folder / REPLAY
     if not page.is_file():
@@ -438,7 +438,7 @@ def _facts(analysis: Analysis, version: str) -> Rows:
     return [{"what": name, "which": value} for name, value in facts]
 
 
-def _machine(run: Run) -> str:
+def _machine(run: RunRecord) -> str:
     start = run.starts[-1]
     threads = count_of(start.threads, "thread") if start.threads else "threads not recorded"
     processes = f", {start.processes} processes" if start.processes > 1 else ""

@@ -1,81 +1,16 @@
-"""The files of an experiment and its runs as models of exactly what a report reads."""
+"""The files of a run as models of exactly what a report reads."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from socialai_dsl.errors import first_mistake
-
-_Words = Annotated[str, BeforeValidator(lambda value: "" if value is None else value)]
-"""A text that may be left out, or null, which is the same."""
+from socialai_dsl.experiments.record import Record
 
 
-class _Record(BaseModel):
-    """A part of a JSON file; what a report does not need is passed over."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
-
-
-class Reference(_Record):
-    """A published figure.
-
-    Attributes:
-        mean: success rate, 0 to 1. std: its standard deviation over seeds; None where it was not published.
-        note: what is to be known about it. source: where it was published.
-    """
-
-    mean: float = Field(ge=0, le=1)
-    std: float | None = Field(None, ge=0)
-    note: _Words = ""
-    source: _Words = ""
-
-
-class ConditionEntry(_Record):
-    """One cell of a table, or one curve of a case study: what its runs have in common but for the seed.
-
-    Attributes:
-        name: unique. row, column: its place in the table of its group.
-        group: `table2`, the name of a case study, or None.
-        scenario: with variants and parameters. agent: who plays. frames: to train for; None if nobody is trained.
-        tests: further scenarios that its agents were tested on.
-        reference: published figure of the scenario itself. test_references: of the tests.
-    """
-
-    name: str
-    row: str | None = None
-    column: str | None = None
-    group: str | None = None
-    scenario: str
-    agent: str = "ppo"
-    frames: int | None = None
-    tests: list[str] = Field(default_factory=list)
-    reference: Reference | None = None
-    test_references: dict[str, Reference] = Field(default_factory=dict)
-
-
-class RunEntry(_Record):
-    """A run of a condition; its folder is `runs/<id>`."""
-
-    id: str
-    condition: str
-    seed: int
-
-
-class ExperimentRecord(_Record):
-    """`experiment.json`."""
-
-    format: Literal[1]
-    name: str
-    profile: _Words = ""
-    about: _Words = ""
-    source_sha256: str = ""
-    conditions: list[ConditionEntry]
-    runs: list[RunEntry]
-
-
-class EndingRecord(_Record):
+class EndingRecord(Record):
     """How test episodes ended, with the line of the scenario's file that says so."""
 
     outcome: str
@@ -86,7 +21,7 @@ class EndingRecord(_Record):
     share: float
 
 
-class ProbeFigures(_Record):
+class ProbeFigures(Record):
     """How a language model answered a probe: how often it was asked, and right; the share that guessing gets right."""
 
     asked: int = Field(ge=0)
@@ -94,7 +29,7 @@ class ProbeFigures(_Record):
     chance: float | None = Field(None, ge=0, le=1)
 
 
-class Figures(_Record):
+class Figures(Record):
     """What came of the test episodes: the object `eval` of a result.
 
     Attributes:
@@ -118,7 +53,7 @@ class Figures(_Record):
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
 
 
-class ResultRecord(_Record):
+class ResultRecord(Record):
     """`result.json`."""
 
     frames: int = 0
@@ -129,14 +64,14 @@ class ResultRecord(_Record):
     versions: dict[str, str] = Field(default_factory=dict)
 
 
-class StatusRecord(_Record):
+class StatusRecord(Record):
     """`status.json`; a run without it is judged by the files it has."""
 
     state: Literal["waiting", "running", "done", "failed", "cancelled"]
     message: str | None = None
 
 
-class StartRecord(_Record):
+class StartRecord(Record):
     """A line of `starts.jsonl`."""
 
     cpu: str = ""
@@ -145,7 +80,7 @@ class StartRecord(_Record):
     processes: int = 1
 
 
-class UpdateRecord(_Record):
+class UpdateRecord(Record):
     """A line of `metrics.jsonl`.
 
     Attributes:

@@ -16,10 +16,11 @@ from socialai_dsl.cli.experiment_tables import clock
 from socialai_dsl.cli.main import main
 from socialai_dsl.experiments import estimate
 from socialai_dsl.experiments.document import document_of
-from socialai_dsl.experiments.folder import Run, Status, runs_of
+from socialai_dsl.experiments.folder import PlannedRun, runs_of
 from socialai_dsl.experiments.work import _Work
-from socialai_dsl.folder_lock import Holder
 from socialai_dsl.frontend import load_experiment
+from socialai_dsl.runs.lock import Holder
+from socialai_dsl.runs.status import Status
 
 Capture = pytest.CaptureFixture[str]
 
@@ -172,17 +173,15 @@ class Terminal(io.StringIO):
 def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("socialai_dsl.cli.experiment_progress._SECONDS_BETWEEN_LINES", -1)
     condition = {"name": "one", "scenario": "dance", "frames": 100, "options": {"net": "fast"}}
-    runs = [Run(tmp_path / str(seed), str(seed), condition, seed, ()) for seed in range(3)]
+    runs = [PlannedRun(tmp_path / str(seed), condition, seed, ()) for seed in range(3)]
     for run in runs:
-        run.path.mkdir()
+        run.folder.mkdir()
     status = Status()
     status.begin(1, 0)
     runs[1].write_status(status)
-    (runs[1].path / "metrics.jsonl").write_text('{"frames": 50, "frames_per_second": 10.0}\n')
+    (runs[1].folder / "metrics.jsonl").write_text('{"frames": 50, "frames_per_second": 10.0}\n')
     worker = Holder(1, "here", "now")
-    monkeypatch.setattr(
-        "socialai_dsl.experiments.folder.worker_of", lambda path: worker if path.name == "1" else None
-    )
+    monkeypatch.setattr(PlannedRun, "worker", property(lambda run: worker if run.id == "1" else None))
     with RunsProgress(runs, stream) as shown:
         shown.ended(runs[0], "failed", "no memory")
         shown.look()
@@ -197,7 +196,7 @@ def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.Monke
 def test_failures_stay_in_sight(tmp_path: Path) -> None:
     """However many runs end after them, and however small the terminal is."""
     condition = {"name": "one", "frames": 100, "options": {"net": "mine"}}
-    runs = [Run(tmp_path / str(seed), str(seed), condition, seed, ()) for seed in range(40)]
+    runs = [PlannedRun(tmp_path / str(seed), condition, seed, ()) for seed in range(40)]
     with RunsProgress(runs, Terminal()) as shown:
         shown.ended(runs[0], "failed", "no memory")
         for run in runs[1:]:

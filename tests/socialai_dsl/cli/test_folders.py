@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialai_dsl import run_folder
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.evaluation import EvalResult, Player, RandomPolicy, evaluate_agent, record, trace
 from socialai_dsl.loader.reader import shipped_folder
-from socialai_dsl.run_folder import only_writer
+from socialai_dsl.runs import folder as run_folder
+from socialai_dsl.runs.folder import only_writer
 from trainer.play import CheckpointPolicy
 
 Capture = pytest.CaptureFixture[str]
@@ -141,7 +141,7 @@ def test_the_second_writer_of_a_folder_hears_of_the_first(
     folder = tmp_path / "folder"
     shutil.copytree(moved, folder)
     script = (
-        "from pathlib import Path; from socialai_dsl.run_folder import only_writer\n"
+        "from pathlib import Path; from socialai_dsl.runs.folder import only_writer\n"
         f"with only_writer(Path({str(folder)!r})): print('here', flush=True); input()"
     )
     pipe = subprocess.PIPE

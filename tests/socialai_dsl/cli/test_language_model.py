@@ -16,7 +16,7 @@ from socialai_dsl.cli.main import main
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
-from socialai_dsl.run_folder import scenario_folder_name
+from socialai_dsl.runs.folder import scenario_folder_name
 from tests.quick import one_in
 from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
 

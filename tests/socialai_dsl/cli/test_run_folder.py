@@ -5,17 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl import run_folder
+from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.errors import UsageError
-from socialai_dsl.run_folder import (
-    SETTINGS,
-    new_run_folder,
-    read_json,
-    scenario_folder_name,
-    versions,
-    write_json,
-    write_text,
-)
+from socialai_dsl.runs import folder as run_folder
+from socialai_dsl.runs.folder import CONFIG, new_run_folder, scenario_folder_name
+from socialai_dsl.runs.versions import versions
 
 
 @pytest.mark.parametrize(
@@ -46,7 +40,7 @@ def test_two_runs_in_one_second_have_two_folders(tmp_path: Path, monkeypatch: py
 
 def test_a_folder_with_a_run_is_not_overwritten(tmp_path: Path) -> None:
     with new_run_folder(tmp_path / "new", "dance", 0) as folder:
-        write_json(folder / SETTINGS, {})
+        write_json(folder / CONFIG, {})
     with (
         pytest.raises(UsageError, match="holds a run already"),
         new_run_folder(tmp_path / "new", "dance", 0),

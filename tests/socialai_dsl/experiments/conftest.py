@@ -15,7 +15,7 @@ from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.main import main
 from socialai_dsl.experiments import work
 from socialai_dsl.experiments.document import document_of
-from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, Run, read_experiment, runs_of
+from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, PlannedRun, read_experiment, runs_of
 from socialai_dsl.frontend import load_experiment
 
 HERE = Path(__file__).parent
@@ -71,7 +71,7 @@ class Place:
             (self.out / RUNS).mkdir(parents=True)
             write_json(self.out / EXPERIMENT, self.document)
 
-    def runs(self) -> dict[str, Run]:
+    def runs(self) -> dict[str, PlannedRun]:
         """Label -> run."""
         document = read_experiment(self.out)
         assert document is not None
@@ -90,10 +90,10 @@ class Place:
             time.sleep(0.02)
         raise AssertionError("it did not happen")
 
-    def at_work(self) -> Run | None:
+    def at_work(self) -> PlannedRun | None:
         """A run that has got past a checkpoint, and not to its end."""
         for run in self.runs().values():
-            if run.status().state == "running" and run.checkpoint_frames():
+            if run.status.state == "running" and run.checkpoint_frames:
                 return run
         return None
 

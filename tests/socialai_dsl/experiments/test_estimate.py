@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.experiments.estimate import Speeds, remember
-from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.folder import PlannedRun
 
 
 @pytest.fixture(autouse=True)
@@ -18,17 +18,17 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def run(
     place: Path, scenario: str, net: str = "fast", speed: float | None = None, frames: int | None = 1000
-) -> Run:
+) -> PlannedRun:
     path = place / f"{scenario}-{net}-{speed}"
     path.mkdir()
     if speed is not None:
         (path / "result.json").write_text(json.dumps({"frames": 1000, "frames_per_second": speed}))
-    return Run(
-        path, path.name, {"name": "c", "scenario": scenario, "frames": frames, "options": {"net": net}}, 0, ()
+    return PlannedRun(
+        path, {"name": "c", "scenario": scenario, "frames": frames, "options": {"net": net}}, 0, ()
     )
 
 
-def known(speeds: Speeds, of: Run) -> tuple[float, str] | None:
+def known(speeds: Speeds, of: PlannedRun) -> tuple[float, str] | None:
     speed = speeds.of(of.condition)
     return None if speed is None else (speed.frames_per_second, speed.source)
 
@@ -53,9 +53,9 @@ def test_what_is_usual_then_what_was_measured_then_what_ran_here(tmp_path):
 
 def test_a_run_under_way_tells_as_well_and_needs_less(tmp_path):
     asked = run(tmp_path, "dance")
-    (asked.path / "metrics.jsonl").write_text('{"frames": 600, "frames_per_second": 200.0}\n')
-    (asked.path / "checkpoints").mkdir()
-    (asked.path / "checkpoints" / "000000000000600.safetensors").touch()
+    (asked.folder / "metrics.jsonl").write_text('{"frames": 600, "frames_per_second": 200.0}\n')
+    (asked.folder / "checkpoints").mkdir()
+    (asked.folder / "checkpoints" / "000000000000600.safetensors").touch()
     assert Speeds([asked]).remaining(asked) == pytest.approx(2 + 15)
 
 
@@ -63,9 +63,9 @@ def test_what_a_run_takes_besides_training(tmp_path):
     """To start and to test: as the runs did that are done."""
     done, chance = run(tmp_path, "dance", speed=10), run(tmp_path, "help", frames=None)
     assert Speeds([done]).remaining(chance) == 15
-    (done.path / "result.json").write_text('{"train_seconds": 60.0}')
+    (done.folder / "result.json").write_text('{"train_seconds": 60.0}')
     attempts = [{"started": 100, "ended": 150}, {"started": 200, "ended": 220.5}]
-    (done.path / "status.json").write_text(json.dumps({"state": "done", "attempts": attempts}))
+    (done.folder / "status.json").write_text(json.dumps({"state": "done", "attempts": attempts}))
     speeds = Speeds([done])
     assert (speeds.remaining(done), speeds.remaining(chance)) == (0, 10.5)
 

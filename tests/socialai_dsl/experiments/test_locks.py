@@ -12,25 +12,26 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl import run_folder
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.driver import _known
-from socialai_dsl.experiments.folder import Run, Status, worker_of
+from socialai_dsl.experiments.folder import PlannedRun
 from socialai_dsl.experiments.work import Outcome, _performed_alone, cancel, retry
-from socialai_dsl.folder_lock import hold
-from socialai_dsl.run_folder import only_writer
+from socialai_dsl.runs import folder as run_folder
+from socialai_dsl.runs.folder import only_writer
+from socialai_dsl.runs.lock import hold
+from socialai_dsl.runs.status import Status
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Run:
-    return Run(tmp_path, "abc", {"name": "one", "frames": 100, "options": {}}, 0, ())
+def run(tmp_path: Path) -> PlannedRun:
+    return PlannedRun(tmp_path, {"name": "one", "frames": 100, "options": {}}, 0, ())
 
 
 @pytest.fixture
 def other(tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
     """Another process that works on the run and writes its folder."""
     script = (
-        "import time; from pathlib import Path; from socialai_dsl.folder_lock import hold\n"
+        "import time; from pathlib import Path; from socialai_dsl.runs.lock import hold\n"
         f"folder = Path({str(tmp_path)!r})\n"
         "with hold(folder, 'worker'), hold(folder, 'run'): print('held', flush=True); time.sleep(60)"
     )
@@ -41,7 +42,7 @@ def other(tmp_path: Path) -> Iterator["subprocess.Popen[str]"]:
         process.kill()
 
 
-def test_one_of_many_works(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_of_many_works(run: PlannedRun, monkeypatch: pytest.MonkeyPatch) -> None:
     barrier, ends = threading.Barrier(8), []
 
     def work(_: object) -> tuple[Outcome, str]:
@@ -62,7 +63,7 @@ def test_one_of_many_works(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(ends) == [Outcome.DONE, *[Outcome.HELD] * 7]
 
 
-def test_who_looks_keeps_nobody_from_working(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_looks_keeps_nobody_from_working(run: PlannedRun, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many look all the time, in every way there is, each of many tries to work succeeds."""
     monkeypatch.setattr("socialai_dsl.experiments.work._Work.perform", lambda _: (Outcome.DONE, ""))
     run.write_status(Status("running"))
@@ -70,7 +71,7 @@ def test_who_looks_keeps_nobody_from_working(run: Run, monkeypatch: pytest.Monke
 
     def look() -> None:
         while not over.is_set():
-            looks.append((worker_of(run.path), run.shown_status(), _known(run)))
+            looks.append((run.worker, run.shown_status, _known(run)))
 
     threads = [threading.Thread(target=look) for _ in range(4)]
     for thread in threads:
@@ -85,32 +86,32 @@ def test_who_looks_keeps_nobody_from_working(run: Run, monkeypatch: pytest.Monke
     assert len(looks) > 100
 
 
-def test_a_worker_is_named_until_it_is_killed(run: Run, other: "subprocess.Popen[str]") -> None:
+def test_a_worker_is_named_until_it_is_killed(run: PlannedRun, other: "subprocess.Popen[str]") -> None:
     run.write_status(Status("running"))
-    found = worker_of(run.path)
+    found = run.worker
     assert found is not None
     assert (found.pid, found.host) == (other.pid, socket.gethostname())
     assert abs((datetime.now(UTC) - datetime.fromisoformat(found.since)).total_seconds()) < 60
-    assert run.shown_status().state == "running"
+    assert run.shown_status.state == "running"
     assert not retry(run)
     other.kill()
     other.wait()
-    assert worker_of(run.path) is None
-    assert run.shown_status().state == "waiting"
+    assert run.worker is None
+    assert run.shown_status.state == "waiting"
     assert retry(run)
 
 
-def test_looking_at_a_run_makes_nothing_in_its_folder(run: Run) -> None:
-    assert worker_of(run.path) is None
-    assert list(run.path.iterdir()) == []
+def test_looking_at_a_run_makes_nothing_in_its_folder(run: PlannedRun) -> None:
+    assert run.worker is None
+    assert list(run.folder.iterdir()) == []
 
 
-def test_a_run_that_nobody_works_on_is_given_up_at_once(run: Run) -> None:
+def test_a_run_that_nobody_works_on_is_given_up_at_once(run: PlannedRun) -> None:
     cancel(run)
-    assert run.status().state == "cancelled"
+    assert run.status.state == "cancelled"
     assert retry(run)
-    assert run.status().state == "waiting"
-    assert not run.is_cancelled()
+    assert run.status.state == "waiting"
+    assert not run.is_cancelled
 
 
 def test_two_processes_do_not_write_one_folder(

@@ -15,7 +15,7 @@ import pytest
 
 from socialai_dsl.cli.main import main
 from socialai_dsl.experiments import work
-from socialai_dsl.experiments.folder import Run, read_experiment, runs_of
+from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
@@ -33,7 +33,7 @@ overrides:
 UPDATES = 30
 
 
-def runs_in(folder: Path) -> list[Run]:
+def runs_in(folder: Path) -> list[PlannedRun]:
     document = read_experiment(folder)
     return [] if document is None else runs_of(folder, document)
 
@@ -42,11 +42,11 @@ def table(folder: Path) -> dict[str, Any]:
     """What the experiment found: success on each test set, and the digest of the weights of each run."""
     found = {}
     for run in runs_in(folder):
-        result = run.result()
+        result = run.result
         assert result is not None, run.label
-        weights = sorted((run.path / "checkpoints").glob("*.safetensors"))[-1]
+        weights = sorted((run.folder / "checkpoints").glob("*.safetensors"))[-1]
         digest = result.get("digest") or hashlib.sha256(tensors_of(weights)).hexdigest()
-        tested = {name: figures["success_rate"] for name, figures in run.tested().items()}
+        tested = {name: figures["success_rate"] for name, figures in run.tested.items()}
         found[run.label] = (result["eval"]["success_rate"], tested, weights.name, digest)
     return found
 
@@ -110,12 +110,12 @@ class Cluster:
     def add(self) -> None:
         self.second = self.nodes.add_node(num_cpus=1, object_store_memory=80_000_000)
 
-    def under_way(self, *besides: str, second: bool = False) -> Run | None:
+    def under_way(self, *besides: str, second: bool = False) -> PlannedRun | None:
         """A run in training that has got past a checkpoint, perhaps one of a worker of the second node."""
         raylet = self.second.all_processes["raylet"][0].process.pid
         for run in runs_in(self.out):
-            frames = run.checkpoint_frames() or 0
-            begun = run.status().state == "running" and 0 < frames < 20 * self.update
+            frames = run.checkpoint_frames or 0
+            begun = run.status.state == "running" and 0 < frames < 20 * self.update
             if run.id not in besides and begun and (not second or parent_of(owner(run)) == raylet):
                 return run
         return None
@@ -128,9 +128,9 @@ class Cluster:
         self.nodes.shutdown()
 
 
-def owner(run: Run) -> int:
+def owner(run: PlannedRun) -> int:
     """Ray's worker that works on a run: the parent of the process that trains."""
-    return parent_of(run.status().attempts[-1]["pid"]) or 0
+    return parent_of(run.status.attempts[-1]["pid"]) or 0
 
 
 def parent_of(pid: int) -> int | None:
@@ -172,12 +172,12 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
     until(lambda: lost.shown_status().state == "waiting", 300)
     cluster.add()
 
-    until(lambda: [run for run in runs_in(cluster.out) if run.status().state == "done"], 600)
+    until(lambda: [run for run in runs_in(cluster.out) if run.status.state == "done"], 600)
     orphaned = until(lambda: cluster.under_way(killed.id, lost.id), 600)
     driver.kill()
     driver.wait()
     until(lambda: orphaned.shown_status().state == "waiting", 300)
-    ends = {run.id: run.status().attempts for run in runs_in(cluster.out) if run.status().state == "done"}
+    ends = {run.id: run.status.attempts for run in runs_in(cluster.out) if run.status.state == "done"}
 
     again = cluster.start()
     said, _ = again.communicate(timeout=1800)
@@ -185,18 +185,18 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
     runs = runs_in(cluster.out)
     assert len(runs) == 4 * cluster.seeds
     for run in runs:
-        status = run.status()
+        status = run.status
         assert status.state == "done", run.label
         assert [attempt["reason"] for attempt in status.attempts].count("done") == 1
         assert all(attempt["ended"] is not None for attempt in status.attempts)
         frames = [
-            json.loads(line)["frames"] for line in (run.path / "metrics.jsonl").read_text().splitlines()
+            json.loads(line)["frames"] for line in (run.folder / "metrics.jsonl").read_text().splitlines()
         ]
         assert frames == [cluster.update * (n + 1) for n in range(UPDATES)], "each update is there once"
         assert run.id not in ends or status.attempts == ends[run.id], "what was done is left alone"
     for run in (killed, lost, orphaned):
-        assert any(attempt["from_frames"] > 0 for attempt in run.status().attempts), run.label
-        assert len(run.status().attempts) >= 2
+        assert any(attempt["from_frames"] > 0 for attempt in run.status.attempts), run.label
+        assert len(run.status.attempts) >= 2
 
     undisturbed = tmp_path / "undisturbed"
     assert main(["experiment", "run", str(cluster.file), "--out", str(undisturbed)]) == 0

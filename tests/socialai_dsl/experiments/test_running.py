@@ -10,17 +10,17 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.experiments.folder import Run
+from socialai_dsl.experiments.folder import PlannedRun
 
 pytestmark = pytest.mark.thorough("starts commands and workers, and kills them")
 
 
-def reasons(run: Run) -> list[str]:
-    return [attempt["reason"] for attempt in run.status().attempts]
+def reasons(run: PlannedRun) -> list[str]:
+    return [attempt["reason"] for attempt in run.status.attempts]
 
 
 def results(place: Any) -> dict[str, Any]:
-    return {label: (run.result(), run.tested()) for label, run in place.runs().items()}
+    return {label: (run.result, run.tested) for label, run in place.runs().items()}
 
 
 def is_alive(pid: int) -> bool:
@@ -31,8 +31,8 @@ def is_alive(pid: int) -> bool:
     return True
 
 
-def updates(run: Run) -> list[int]:
-    lines = (run.path / "metrics.jsonl").read_text().splitlines()
+def updates(run: PlannedRun) -> list[int]:
+    lines = (run.folder / "metrics.jsonl").read_text().splitlines()
     return [json.loads(line)["frames"] for line in lines]
 
 
@@ -56,7 +56,7 @@ def test_all_runs_come_to_their_end(place, capsys):
     assert place.run() == 0
     runs = place.runs()
     assert len(runs) == 3
-    assert {run.status().state for run in runs.values()} == {"done"}
+    assert {run.status.state for run in runs.values()} == {"done"}
     assert all(reasons(run) == ["done"] for run in runs.values() if run.condition["agent"] == "ppo")
     assert runs["chance, seed 0"].tested() == {"help": {"success_rate": 0.5}}
     assert "3 done" in capsys.readouterr().out
@@ -64,19 +64,19 @@ def test_all_runs_come_to_their_end(place, capsys):
 
 def test_a_second_time_nothing_is_done(place, capsys):
     place.run()
-    before = {label: run.status().attempts for label, run in place.runs().items()}
+    before = {label: run.status.attempts for label, run in place.runs().items()}
     capsys.readouterr()
     assert place.run("--json") == 0
-    assert {label: run.status().attempts for label, run in place.runs().items()} == before
+    assert {label: run.status.attempts for label, run in place.runs().items()} == before
     assert json.loads(capsys.readouterr().out)["states"] == {"done": 3}
 
 
 def test_a_killed_process_is_resumed_from_its_checkpoint(place, undisturbed):
     driver = place.start("--workers", "1", seconds=0.05)
     run = place.until(place.at_work)
-    os.kill(run.status().attempts[-1]["pid"], signal.SIGKILL)
+    os.kill(run.status.attempts[-1]["pid"], signal.SIGKILL)
     assert driver.wait(60) == 0
-    first, second = run.status().attempts
+    first, second = run.status.attempts
     assert first["reason"] == "killed by signal SIGKILL"
     assert second["from_frames"] > 0
     assert second["reason"] == "done"
@@ -87,14 +87,14 @@ def test_a_killed_process_is_resumed_from_its_checkpoint(place, undisturbed):
 def test_a_killed_driver_leaves_nobody_behind_and_the_command_goes_on(place, undisturbed):
     driver = place.start("--workers", "1", seconds=0.05)
     run = place.until(place.at_work)
-    worker = run.status().attempts[-1]
+    worker = run.status.attempts[-1]
     driver.kill()
     driver.wait()
     place.until(lambda: not is_alive(worker["pid"]))
-    assert run.shown_status().state == "waiting"
+    assert run.shown_status.state == "waiting"
     assert place.run() == 0
     assert results(place) == undisturbed
-    first, second = run.status().attempts
+    first, second = run.status.attempts
     assert (first["reason"], second["reason"]) == ("its process was gone", "done")
     assert second["from_frames"] > 0
     assert updates(run) == list(range(100, 1001, 100))
@@ -110,9 +110,9 @@ def test_stopped_by_a_person_or_the_system(place, undisturbed, number):
     said, _ = driver.communicate(timeout=30)
     assert driver.returncode == 130, said
     assert b"the same command goes on" in said
-    assert run.status().state == "waiting"
+    assert run.status.state == "waiting"
     assert reasons(run) == ["stopped"]
-    assert run.checkpoint_frames() == updates(run)[-1], "an update was not saved"
+    assert run.checkpoint_frames == updates(run)[-1], "an update was not saved"
     assert place.run() == 0
     assert results(place) == undisturbed
 
@@ -131,8 +131,8 @@ def test_a_run_that_fails_stops_no_other(place, capsys):
     place.file.write_text(place.file.read_text().replace("- {name", "- {name: ill, envs: 13}\n  - {name"))
     assert place.run() == 1
     runs = place.runs()
-    assert {label for label, run in runs.items() if run.status().state == "failed"} == {"ill, seed 0"}
-    assert runs["ill, seed 0"].status().message == "thirteen environments bring bad luck"
+    assert {label for label, run in runs.items() if run.status.state == "failed"} == {"ill, seed 0"}
+    assert runs["ill, seed 0"].status.message == "thirteen environments bring bad luck"
     said = capsys.readouterr().out
     assert "3 done, 1 failed" in said
     assert f"ill, seed 0 ({runs['ill, seed 0'].id}): thirteen environments bring bad luck" in said
@@ -144,12 +144,12 @@ def test_an_unreadable_folder_stops_no_other(place, capsys):
     place.run()
     runs = place.runs()
     for label in ("none, seed 0", "cell, seed 0"):
-        (runs[label].path / "result.json").unlink()
-        (runs[label].path / "status.json").write_text("{" if label.startswith("none") else "{}")
+        (runs[label].folder / "result.json").unlink()
+        (runs[label].folder / "status.json").write_text("{" if label.startswith("none") else "{}")
     capsys.readouterr()
     assert place.run() == 1
     said = capsys.readouterr().out
-    assert f"{runs['none, seed 0'].path / 'status.json'}: not JSON" in said
+    assert f"{runs['none, seed 0'].folder / 'status.json'}: expected JSON" in said
     assert "1 done, 2 failed" in said
 
 
@@ -157,19 +157,19 @@ def test_a_full_disk_stops_no_other(place):
     """The disk of one run, which is large enough to begin."""
     place.prepare()
     run = place.runs()["none, seed 0"]
-    run.path.mkdir()
+    run.folder.mkdir()
     try:
-        mount = ["mount", "-t", "tmpfs", "-o", "size=32k", "tmpfs", str(run.path)]
+        mount = ["mount", "-t", "tmpfs", "-o", "size=32k", "tmpfs", str(run.folder)]
         subprocess.run(mount, check=True, capture_output=True, timeout=20)
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("only root can make a disk")
     try:
         assert place.run() == 1
-        assert run.status().state == "failed"
-        assert os.strerror(errno.ENOSPC) in run.status().message
+        assert run.status.state == "failed"
+        assert os.strerror(errno.ENOSPC) in run.status.message
     finally:
-        subprocess.run(["umount", "--lazy", str(run.path)], check=True, capture_output=True, timeout=20)
-    assert [other.status().state for other in place.runs().values() if other.id != run.id] == ["done", "done"]
+        subprocess.run(["umount", "--lazy", str(run.folder)], check=True, capture_output=True, timeout=20)
+    assert [other.status.state for other in place.runs().values() if other.id != run.id] == ["done", "done"]
 
 
 def test_cancelled_and_tried_again(place, undisturbed, capsys):
@@ -178,16 +178,16 @@ def test_cancelled_and_tried_again(place, undisturbed, capsys):
     assert place.socialai("cancel", str(place.out), run.id, "chance") == 0
     assert capsys.readouterr().out == "2 runs cancelled\n"
     assert driver.wait(60) == 0
-    assert {label for label, other in place.runs().items() if other.status().state == "cancelled"} == {
+    assert {label for label, other in place.runs().items() if other.status.state == "cancelled"} == {
         run.label,
         "chance, seed 0",
     }
     assert place.run() == 0, "what was cancelled stays so"
-    assert run.status().state == "cancelled"
+    assert run.status.state == "cancelled"
     assert place.socialai("retry", str(place.out)) == 0
     assert place.run() == 0
     assert results(place) == undisturbed
-    assert run.status().attempts[-1]["from_frames"] > 0
+    assert run.status.attempts[-1]["from_frames"] > 0
 
 
 def test_another_configuration_is_refused(place, capsys):
@@ -201,8 +201,8 @@ def test_another_configuration_is_refused(place, capsys):
     kept = place.runs()["none, seed 0"]
     assert place.run("--update") == 0
     assert place.runs()["none, seed 0"].id != kept.id
-    assert place.runs()["chance, seed 0"].path.exists()
-    assert kept.status().state == "done", "what was there before stays"
+    assert place.runs()["chance, seed 0"].folder.exists()
+    assert kept.status.state == "done", "what was there before stays"
 
 
 def test_experiments_that_share_a_folder_share_runs(place, tmp_path):
@@ -220,10 +220,10 @@ def test_experiments_that_share_a_folder_share_runs(place, tmp_path):
 
 def test_a_test_that_is_added_is_all_that_is_done(place):
     place.run()
-    trained = place.runs()["none, seed 0"].status().attempts
+    trained = place.runs()["none, seed 0"].status.attempts
     place.file.write_text(place.file.read_text().replace("set: {", "set: {tests: [help, talkitout], "))
     assert place.run("--update") == 0
     run = place.runs()["none, seed 0"]
-    assert sorted(run.tested()) == ["help", "talkitout"]
-    assert run.status().attempts[:1] == trained
-    assert run.status().attempts[1]["from_frames"] == 1000
+    assert sorted(run.tested) == ["help", "talkitout"]
+    assert run.status.attempts[:1] == trained
+    assert run.status.attempts[1]["from_frames"] == 1000

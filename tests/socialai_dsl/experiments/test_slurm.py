@@ -37,7 +37,7 @@ def test_all_runs_come_to_their_end_as_jobs(prepared, monkeypatch):
     ):
         pass
     assert ends == dict.fromkeys(prepared.runs(), ("done", ""))
-    assert {run.status().state for run in prepared.runs().values()} == {"done"}
+    assert {run.status.state for run in prepared.runs().values()} == {"done"}
 
 
 class PretendJob(Job):
@@ -63,13 +63,13 @@ def test_a_machine_is_taken_away(prepared, monkeypatch):
     engine = SlurmEngine(prepared.out, 1, 1, {"timeout_min": 5}, cluster="local")
     run = prepared.runs()["none, seed 0"]
     (job,) = engine.submit(prepared.out, [run.id])
-    prepared.until(lambda: run.checkpoint_frames())
-    status = Path(f"/proc/{run.status().attempts[-1]['pid']}/stat").read_text()
+    prepared.until(lambda: run.checkpoint_frames)
+    status = Path(f"/proc/{run.status.attempts[-1]['pid']}/stat").read_text()
     parent = int(status.rpartition(")")[2].split()[1])
     os.kill(parent, signal.SIGUSR2)  # as Slurm does some time before it takes a machine away
     assert job.result() == ("done", "")
-    assert [attempt["reason"] for attempt in run.status().attempts] == ["stopped", "done"]
-    assert run.status().attempts[1]["from_frames"] > 0
+    assert [attempt["reason"] for attempt in run.status.attempts] == ["stopped", "done"]
+    assert run.status.attempts[1]["from_frames"] > 0
 
 
 def test_what_slurm_is_told(prepared, tmp_path, monkeypatch):

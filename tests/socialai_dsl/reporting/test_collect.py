@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.folder_lock import hold
-from socialai_dsl.reporting.collect import Run, read_experiment, read_runs
+from socialai_dsl.reporting.collect import RunRecord, read_experiment, read_runs
+from socialai_dsl.runs.lock import hold
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
 
 
@@ -17,7 +17,7 @@ def folder(tmp_path: Path) -> Path:
     return write_experiment(tmp_path, [condition("Help / PPO", [0.2, 0.4, 0.6, 0.8])])
 
 
-def runs(folder: Path) -> list[Run]:
+def runs(folder: Path) -> list[RunRecord]:
     return read_experiment(folder).runs
 
 

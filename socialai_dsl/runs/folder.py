@@ -1,0 +1,250 @@
+"""The folder of a run: the names of its files, who may write them, and how they are read."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from socialai_dsl.atomic import read_json
+from socialai_dsl.errors import UnreadableError, UsageError, described_error, first_mistake
+from socialai_dsl.runs.lock import HeldError, Holder, hold, holder
+from socialai_dsl.runs.status import Status
+from trainer.config import SCENARIO_FOLDER as SCENARIO
+from trainer.config import RunConfig
+from trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
+
+# What training writes, and the copy of the scenario, are named where the trainer finds them.
+__all__ = ["CHECKPOINTS", "METRICS", "SCENARIO", "STARTS"]
+
+CONFIG: Final = "config.json"
+RESULT: Final = "result.json"
+CARD: Final = "model_card.md"
+CURVE: Final = "learning_curve.png"
+REPLAY: Final = "episode.html"
+TRANSCRIPT: Final = "transcript.txt"
+FILM: Final = "episode.gif"
+FAILURE: Final = "failure"
+"""The name of film and transcript of a failure, without their endings."""
+
+EPISODES: Final = "episodes.csv"
+TESTS: Final = "tests.json"
+STATUS: Final = "status.json"
+CANCEL: Final = "cancel"
+
+_RUNS: Final = Path("runs")
+"""Where runs go unless the user says otherwise."""
+
+_WRITER: Final = "run"
+_WORKER: Final = "worker"
+LOCK_FILES: Final = tuple(f"{_WRITER}.{ending}" for ending in ("lock", "owner"))
+_SECONDS_TO_WAIT: Final = 5.0
+"""A process whose parent was killed takes a moment to end."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run, as its folder tells it; the folder may not exist yet.
+
+    Two locks guard it: `only_writer` is held by the process that writes the run's files, `worker_lock` by that of an
+    experiment, which starts one such process after another and has to see that a killed one has ended.
+
+    Attributes:
+        folder: where it is.
+    """
+
+    folder: Path
+
+    @property
+    def id(self) -> str:
+        """The name of its folder."""
+        return self.folder.name
+
+    @property
+    def config(self) -> RunConfig:
+        """Its options; see `read_config`."""
+        return read_config(self.folder)
+
+    @property
+    def result(self) -> dict[str, Any] | None:
+        """What came of it, as `result.json` has it; None if it has not come to its end.
+
+        Raises:
+            UnreadableError: the file is damaged.
+        """
+        return self._read(RESULT)
+
+    @property
+    def tested(self) -> dict[str, Any]:
+        """What was found on other scenarios: name -> figures."""
+        return self._read(TESTS) or {}
+
+    @property
+    def checkpoint_frames(self) -> int | None:
+        """Frames of the newest checkpoint; None if there is none."""
+        names = [file.stem for file in checkpoint_files(self.folder / CHECKPOINTS)]
+        return max((int(name) for name in names if name.isdigit()), default=None)
+
+    @property
+    def last_metrics(self) -> Mapping[str, Any] | None:
+        """The last complete row of its figures; None if there is none."""
+        try:
+            with open(self.folder / METRICS, "rb") as file:
+                size = file.seek(0, os.SEEK_END)
+                file.seek(max(0, size - 65_536))
+                lines = file.read().split(b"\n")[:-1]
+        except OSError:
+            return None
+        try:
+            row = json.loads(lines[-1]) if lines else None
+        except ValueError:
+            return None
+        return row if isinstance(row, dict) else None
+
+    def _read(self, name: str) -> dict[str, Any] | None:
+        try:
+            return read_json(self.folder / name)
+        except FileNotFoundError:
+            return None
+
+    # -- what an experiment does with it ---------------------------------------------------------------------
+
+    @property
+    def status(self) -> Status:
+        """What its worker says of it; see `Status.read`."""
+        return Status.read(self.folder / STATUS)
+
+    @property
+    def shown_status(self) -> Status:
+        """The status for people: a run whose worker is gone is waiting, one that cannot be read has failed."""
+        try:
+            status = self.status
+            if status.state == "running" and self.worker is None:
+                status.end("its process is gone", self.last_sign)
+                status.state = "waiting"
+        except (OSError, UnreadableError) as error:
+            return Status("failed", message=f"cannot be read: {described_error(error)}")
+        return status
+
+    def write_status(self, status: Status) -> None:
+        """Replace the status; only the worker may.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        status.write(self.folder / STATUS)
+
+    @property
+    def last_sign(self) -> float | None:
+        """When its processes last wrote something, seconds since 1970; None if they never did."""
+        times = []
+        for name in (STATUS, METRICS):
+            with contextlib.suppress(FileNotFoundError):
+                times.append((self.folder / name).stat().st_mtime)
+        return max(times, default=None)
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether a command has asked to give it up."""
+        return (self.folder / CANCEL).exists()
+
+    @property
+    def worker(self) -> Holder | None:
+        """The process that works on it for an experiment; None if there is none."""
+        return holder(self.folder, _WORKER)
+
+    @property
+    def was_left(self) -> bool:
+        """Whether its worker was killed: the lock is there, and nobody holds it."""
+        return (self.folder / f"{_WORKER}.lock").exists() and self.worker is None
+
+    def worker_lock(self) -> AbstractContextManager[None]:
+        """Be its worker.
+
+        Raises:
+            HeldError: on entry, if another process is.
+        """
+        return hold(self.folder, _WORKER)
+
+
+def read_config(folder: Path) -> RunConfig:
+    """The configuration of a run's folder, as of a run in this folder.
+
+    Raises:
+        UsageError: it is not a run's folder, or its configuration is damaged.
+        OSError: it cannot be read.
+    """
+    if not (folder / CONFIG).is_file():
+        raise UsageError(f"{folder} is not a run's folder, it has no {CONFIG}")
+    try:
+        # As JSON, because strict validation takes no lists for tuples from Python.
+        return RunConfig.model_validate_json(json.dumps(read_json(folder / CONFIG))).within(folder)
+    except ValidationError as error:
+        place, said = first_mistake(error.errors())
+        raise UsageError(f"{folder / CONFIG}: {place}: {said}") from None
+
+
+def scenario_folder_name(spec: str) -> str:
+    """`scenarios/talkitout.yaml+unsocial?a=1&b=2` -> `talkitout+unsocial,a=1,b=2`."""
+    path, mark, parameters = spec.partition("?")
+    name, plus, variants = Path(path).name.partition("+")
+    name = name.removesuffix(".yaml").removesuffix(".yml")
+    return name + plus + variants + ("," if mark else "") + parameters.replace("&", ",").replace("/", "_")
+
+
+@contextlib.contextmanager
+def new_run_folder(out: Path | None, spec: str, seed: int) -> Iterator[Path]:
+    """Make the folder of a new run, `out` or `runs/<scenario>/<time>-s<seed>`, and be its only writer.
+
+    Raises:
+        UsageError: `out` holds a run already, or another process writes there.
+        OSError: it cannot be made.
+    """
+    folder = _fresh_folder(spec, seed) if out is None else out
+    with only_writer(folder):
+        if (folder / CONFIG).exists():
+            raise UsageError(
+                f"--out: {out} holds a run already; go on with --resume, or choose another folder"
+            )
+        yield folder
+
+
+def _fresh_folder(spec: str, seed: int) -> Path:
+    """Make a folder that no other run has."""
+    parent = _RUNS / scenario_folder_name(spec)
+    stamp = f"{time.strftime('%Y%m%d-%H%M%S')}-s{seed}"
+    for attempt in range(100):
+        folder = parent / (stamp if attempt == 0 else f"{stamp}-{attempt + 1}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return folder
+    raise UsageError(f"{parent}: a hundred runs were started in this second")
+
+
+@contextlib.contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Be the one process that writes a folder, which is made; the system ends this when the process dies.
+
+    Whoever looks at what the folder holds, to decide what to write, does so inside.
+
+    Raises:
+        UsageError: another process writes there; the message names it.
+        OSError: the folder cannot be made or written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(hold(folder, _WRITER, _SECONDS_TO_WAIT))
+        except HeldError as error:
+            raise UsageError(f"{error}; wait until it ends, or choose another folder") from None
+        yield
