@@ -172,10 +172,10 @@ class _Work:
     def _train(self) -> None:
         """Train if the agent is to be trained, and play its own test set."""
         died_at: list[int] = []
-        while self._run.result is None:
+        while not self._has_result():
             crash = self._process(self._run_command())
             if crash is None:
-                assert self._run.result is not None, "internal: a run that ended well has no result"
+                assert self._has_result(), "internal: a run that ended well has no result"
                 return
             died_at.append(self._run.checkpoint_frames or 0)
             if died_at[-_CRASHES_IN_PLACE:] == [died_at[-1]] * _CRASHES_IN_PLACE:
@@ -183,6 +183,9 @@ class _Work:
                     f"{crash}, {_CRASHES_IN_PLACE} times after {died_at[-1]:,} frames; was there too little memory?"
                 )
             self._status.end(crash)
+
+    def _has_result(self) -> bool:
+        return self._run.result is not None
 
     def _test(self) -> None:
         """Play the other scenarios."""

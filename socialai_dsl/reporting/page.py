@@ -20,6 +20,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from socialai_dsl.baselines import Baselines, Level
+from socialai_dsl.experiments.record import Reference
 from socialai_dsl.reporting.analysis import (
     RISING,
     SOLVED,
@@ -29,7 +30,6 @@ from socialai_dsl.reporting.analysis import (
     Summary,
 )
 from socialai_dsl.reporting.collect import RunRecord
-from socialai_dsl.reporting.records import Reference
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY

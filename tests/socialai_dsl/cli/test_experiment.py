@@ -146,7 +146,7 @@ def test_a_run_of_an_unknown_name(file: Path, capsys: Capture) -> None:
     folder = file.parent / "out"
     folder.mkdir()
     document = {"format": 1, "name": "tiny", "profile": None}
-    conditions = [{"name": "one", "tests": [], "frames": None, "options": {}}]
+    conditions = [{"name": "one", "scenario": "help", "tests": [], "frames": None, "options": {}}]
     document |= {"conditions": conditions, "runs": [{"id": "abc", "condition": "one", "seed": 0}]}
     (folder / "experiment.json").write_text(json.dumps(document))
     assert main(["experiment", "cancel", str(folder), "onne"]) == 2

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.errors import UnreadableError
-from socialai_dsl.runs import status as status_file
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
+from socialai_dsl.runs import status as status_file
 from socialai_dsl.runs.status import Status
 
 
