@@ -13,6 +13,18 @@ class UnreadableError(UsageError):
     """A file of ours is damaged, or of another version; the message says which and how."""
 
 
+class OptionError(UsageError):
+    """An option of a run has a value that it cannot have.
+
+    Attributes:
+        name: of the option, as `RunConfig` has it. said: what was got and expected.
+    """
+
+    def __init__(self, name: str, said: str) -> None:
+        super().__init__(f"{name}: {said}")
+        self.name, self.said = name, said
+
+
 class RunFailed(Exception):  # noqa: N818 - it says what happened
     """A run stopped by itself: its numbers are no longer finite, the disk is full, or a budget is spent."""
 

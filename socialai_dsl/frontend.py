@@ -14,7 +14,6 @@ from socialai_dsl.checking.experiments import (
     LoadedExperiment,
     check_experiment,
     from_anywhere,
-    with_scenarios,
 )
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.checking.scenarios import (
@@ -408,7 +407,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
             played = _check_played(experiment, bag, files)
             _check_curricula(experiment, bag, files)
             _check_scripts(experiment, played, bag, files)
-            right = None if bag.has_errors else with_scenarios(experiment, played)
+            right = None if bag.has_errors else replace(experiment, played=played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)

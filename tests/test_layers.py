@@ -40,7 +40,6 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "atomic": ({"errors"}, set()),
     "baselines": (set(), set()),
     "errors": (set(), set()),
-    "runs": (set(), set()),
     "runs.lock": (set(), {"filelock"}),
     "runs.status": ({"atomic", "errors"}, set()),
     "runs.versions": (set(), set()),
@@ -99,8 +98,19 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "render"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
+    "runs.options": (
+        TEXT_SIDE | {"errors"},
+        {"pydantic", "torch", "yaml", CONFIG},
+    ),
+    "runs": (
+        TEXT_SIDE
+        | {"errors", "atomic", "program_suite", "compilation", "envs", "replay", "evaluation", "reporting"}
+        | {"runs.folder", "runs.options", "runs.versions"},
+        {"yaml", "trainer"},
+    ),
     "experiments": (
-        TEXT_SIDE | {"atomic", "compilation", "errors", "runs.folder", "runs.lock", "runs.status"},
+        TEXT_SIDE
+        | {"atomic", "compilation", "errors", "runs.folder", "runs.lock", "runs.options", "runs.status"},
         {"pydantic", "ray", "submitit", "yaml", CONFIG, FILES, SHIPPED},
     ),
     "reporting": (

@@ -41,10 +41,11 @@ import socialai_dsl
 from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.export import MovedScenario, finished_agent, write_agent
 from socialai_dsl.evaluation.players import Player
 from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent
-from socialai_dsl.runs.folder import RESULT
+from socialai_dsl.runs.copies import MovedScenario
+from socialai_dsl.runs.export import finished_agent, write_agent
+from socialai_dsl.runs.folder import CONFIG, RESULT
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint
 from trainer.shipped import PREFIX, WEIGHTS, agents_folder
@@ -137,7 +138,7 @@ def require_same(evaluation: Evaluation, recorded: Mapping[str, Any]) -> None:
 
 def provenance(run: Path, commit: str | None) -> dict[str, str]:
     """When the run ended, and with which commit of this repository it began: by default the newest before it."""
-    began, ended = ((run / name).stat().st_mtime for name in ("config.json", RESULT))
+    began, ended = ((run / name).stat().st_mtime for name in (CONFIG, RESULT))
     if commit is None:
         command = ["git", "log", "-1", "--first-parent", f"--before=@{int(began)}", "--format=%H"]
         found = subprocess.run(

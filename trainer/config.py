@@ -238,6 +238,9 @@ class RunConfig(BaseModel):
         return {option: file for option, file in files.items() if file.is_file()}
 
 
+UNTRAINED: Final = ("random", "oracle", "human")
+"""Agents without a network: chance, the scenario's script, a person."""
+
 SCENARIO_FOLDER: Final = "scenario"
 """Where a folder keeps the files of the scenario that it is about."""
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.checking.loaded import Loaded, guided_options
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.loader.reader import SUFFIXES, display_name
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
@@ -26,7 +26,7 @@ class LoadedExperiment:
     Attributes:
         experiment: the models. resolved: the data with its positions.
         cells: profile -> its conditions; None is the file without a profile.
-        played: the scenarios, by their names in the file; see `with_scenarios`.
+        played: the scenarios, by their names in the file, once they are loaded.
     """
 
     experiment: Experiment
@@ -125,20 +125,6 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
         _check_agents(own, resolved, bag)
         _check_names(own, resolved, bag)
     return LoadedExperiment(experiment, resolved, cells)
-
-
-def with_scenarios(experiment: LoadedExperiment, played: Mapping[str, Loaded]) -> LoadedExperiment:
-    """The experiment with its scenarios, and with what the recipe `guided` takes from them."""
-
-    def complete(cell: Cell) -> Cell:
-        if not cell.trains or cell.options.get("recipe") != "guided":
-            return cell
-        options = guided_options(played[cell.scenario])
-        frames = options.pop("frames")
-        return replace(cell, frames=cell.frames or frames, options=options | dict(cell.options))
-
-    cells = {profile: tuple(map(complete, own)) for profile, own in experiment.cells.items()}
-    return replace(experiment, played=played, cells=cells)
 
 
 def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticBag) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from socialai_dsl.diagnostics import Diagnostic
 from socialai_dsl.loader.resolved import ResolvedFile
@@ -99,19 +99,3 @@ def unscripted(loaded: Loaded) -> tuple[str, ...]:
     else:
         members = [(loaded.checked.name, loaded)]
     return tuple(name for name, one in members if not any(frame.entity == 0 for frame in one.checked.frames))
-
-
-_GUIDED_FRAMES: Final = 1_000_000
-_GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
-
-
-def guided_options(loaded: Loaded) -> dict[str, Any]:
-    """Options of the recipe `guided` that depend on what is learnt.
-
-    The frames are those that the file says, measured to be enough (docs/mastery.md). A suite that draws its members
-    also gets a curriculum.
-    """
-    if not isinstance(loaded, LoadedSuite):
-        return {"frames": loaded.scenario.training_frames or _GUIDED_FRAMES}
-    options: dict[str, Any] = {"frames": loaded.suite.training_frames or _GUIDED_FRAMES_OF_A_SUITE}
-    return options | ({"curriculum": "even"} if loaded.suite.draw == "uniform" else {})

@@ -15,25 +15,24 @@ from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_opt
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.export import keep_scenario
 from socialai_dsl.evaluation.players import (
     HUMAN_FOLDER,
     MODEL_PREFIX,
-    UNTRAINED,
     Player,
     folder_of,
     named_agent,
     require_trainer,
-    resolve_device,
     session_folder,
 )
 from socialai_dsl.evaluation.recordings import write_recordings
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.testing import Evaluation, own_scenario, play_test_set
 from socialai_dsl.replay.endings import short_name
+from socialai_dsl.runs.copies import keep_scenario
 from socialai_dsl.runs.folder import CONFIG, REPLAY, RESULT, only_writer, scenario_folder_name
+from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.versions import versions
-from trainer.config import RunConfig
+from trainer.config import UNTRAINED, RunConfig
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 FIGURES: Final = "evaluation.json"
@@ -177,7 +176,7 @@ def _player(arguments: argparse.Namespace) -> Player:
     scenario = own_scenario(agent) if has_own else arguments.on[0]
     return Player(
         agent,
-        resolve_device(arguments.device or "auto"),
+        resolved_device(arguments.device or "auto"),
         bool(arguments.greedy),
         drawn,
         arguments.net,

@@ -17,7 +17,8 @@ from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, printable, render_text, suggested
 from socialai_dsl.engine.calls import RoomError
-from socialai_dsl.errors import RunFailed, UsageError
+from socialai_dsl.errors import OptionError, RunFailed, UsageError
+from trainer.config import HYPER
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""
@@ -149,6 +150,9 @@ def _explain(program: str, error: Exception) -> Exit:
     if isinstance(error, ScenarioError):
         print(render_text(error.diagnostics, error.sources, color=shows_color(sys.stderr)), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
+    if isinstance(error, OptionError):
+        option = f"hyper {error.name}" if error.name in HYPER else error.name.replace("_", "-")
+        error = UsageError(f"--{option}: {error.said}")
     if isinstance(error, UsageError | RunFailed | RoomError):
         print(f"{program}: {printable(str(error))}", file=sys.stderr)
         if isinstance(error, UsageError):

@@ -138,7 +138,7 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
-    from socialai_dsl.evaluation.players import MODEL_PREFIX, UNTRAINED, Player, folder_of, named_agent
+    from socialai_dsl.evaluation.players import MODEL_PREFIX, Player, folder_of, named_agent
     from socialai_dsl.evaluation.scripts import script_of
     from socialai_dsl.evaluation.testing import (
         evaluate_agent,
@@ -146,6 +146,7 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
         evaluation_of_person,
         own_scenario,
     )
+    from trainer.config import UNTRAINED
 
     source = arguments.source
     folder = folder_of(source)

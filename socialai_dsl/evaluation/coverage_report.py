@@ -16,8 +16,9 @@ from socialai_dsl.analysis.tally import Tally, TallyItem, parts_of, tally
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import UNTRAINED, Player, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.evaluation.scripts import script_of, with_script
+from trainer.config import UNTRAINED
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")

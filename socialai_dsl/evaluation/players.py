@@ -17,10 +17,10 @@ import socialai_dsl
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.episodes import Observation, Policy, RandomPolicy, ScriptedPolicy
 from socialai_dsl.loader.reader import shipped_folder
+from trainer.config import UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
 
 MODEL_PREFIX: Final = "llm:"
-UNTRAINED: Final = ("random", "oracle", "human")
 HUMAN_FOLDER: Final = Path("runs", "human")
 """Where the sessions of people go unless the user says otherwise."""
 
@@ -213,20 +213,6 @@ def require_trainer() -> None:
     """
     if find_spec("torch") is None:
         raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'")
-
-
-def resolve_device(device: str) -> str:
-    """`auto` is a graphics card where there is one.
-
-    Raises:
-        UsageError: `cuda` was asked for and is not there.
-    """
-    import torch
-
-    available = torch.cuda.is_available()
-    if device == "cuda" and not available:
-        raise UsageError("--device cuda: PyTorch finds no CUDA device on this machine")
-    return "cuda" if device == "cuda" or (device == "auto" and available) else "cpu"
 
 
 def folder_of(agent: str) -> Path:

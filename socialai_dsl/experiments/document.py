@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere, is_phases
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.experiments.settings import resolved_config
+from socialai_dsl.runs.options import resolved_config, usual_options
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
 from trainer.config import WITHOUT_EFFECT, RunConfig
@@ -36,7 +38,7 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         ScenarioError: a scenario cannot be compiled.
         OSError: a checkpoint cannot be read.
     """
-    cells = loaded.cells[profile]
+    cells = [completed(cell, loaded.played[cell.scenario]) for cell in loaded.cells[profile]]
     programs = {
         name: compile_loaded(loaded.played[name]).sha256 for name in {cell.scenario for cell in cells}
     }
@@ -72,6 +74,15 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
     }
 
 
+def completed(cell: Cell, played: Loaded) -> Cell:
+    """The condition with what the recipe `guided` takes from its scenario."""
+    if not cell.trains or cell.options.get("recipe") != "guided":
+        return cell
+    options = usual_options("guided", played)
+    frames = options.pop("frames")
+    return replace(cell, frames=cell.frames or frames, options=options | dict(cell.options))
+
+
 def run_id(cell: Cell, seed: int, program: str, agent: str, code: Mapping[str, str]) -> str:
     """The name of a run's folder: a hash of all that decides what the run computes.
 
@@ -94,7 +105,7 @@ def config_of(cell: Cell, seed: int = 0) -> RunConfig:
     """The configuration of a condition's runs, with every value resolved.
 
     Raises:
-        pydantic.ValidationError: its options contradict each other.
+        OptionError: its options contradict each other.
     """
     given: dict[str, Any] = {"scenario": cell.scenario, "agent": cell.agent, "seed": seed}
     options = {name: value for name, value in cell.options.items() if name != "hyper"}

@@ -15,7 +15,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from socialai_dsl.atomic import read_json
-from socialai_dsl.errors import UnreadableError, UsageError, described_error, first_mistake
+from socialai_dsl.errors import OptionError, UnreadableError, UsageError, described_error, first_mistake
 from socialai_dsl.runs.lock import HeldError, Holder, hold, holder
 from socialai_dsl.runs.status import Status
 from trainer.config import SCENARIO_FOLDER as SCENARIO
@@ -72,6 +72,12 @@ class Run:
     def config(self) -> RunConfig:
         """Its options; see `read_config`."""
         return read_config(self.folder)
+
+    @property
+    def agent(self) -> str:
+        """Its agent, as `evaluate_agent` takes it: the run's folder if it was trained."""
+        config = self.config
+        return str(self.folder) if config.trains else config.agent
 
     @property
     def result(self) -> dict[str, Any] | None:
@@ -211,9 +217,7 @@ def new_run_folder(out: Path | None, spec: str, seed: int) -> Iterator[Path]:
     folder = _fresh_folder(spec, seed) if out is None else out
     with only_writer(folder):
         if (folder / CONFIG).exists():
-            raise UsageError(
-                f"--out: {out} holds a run already; go on with --resume, or choose another folder"
-            )
+            raise OptionError("out", f"{out} holds a run already; resume it, or choose another folder")
         yield folder
 
 

@@ -40,7 +40,7 @@ class Cell:
         name: its own. group: of conditions shown together, if any. row, column: its place in the group's table.
         scenario: with all variants, as it is written in the file, so a path is relative to that.
         agent: `ppo`, `random`, `oracle`, or a path relative to the file.
-        frames: to train for; None where nothing is trained, or where the scenario's file says it, see `with_scenarios`.
+        frames: to train for; None where nothing is trained, or where the recipe `guided` takes it from the scenario.
         seeds: one run for each.
         options: those of `OPTIONS` that are given.
         tests: scenarios played besides, with all variants -> what was found elsewhere.

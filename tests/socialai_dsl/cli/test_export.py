@@ -12,8 +12,8 @@ from safetensors import safe_open
 
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.evaluation.export import MovedScenario
 from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.runs.copies import MovedScenario
 
 Capture = pytest.CaptureFixture[str]
 

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 import torch
 
-from socialai_dsl.cli import run as run_command
 from socialai_dsl.cli.main import run_main
 from socialai_dsl.errors import UsageError
 from trainer import checkpoint as checkpoints
@@ -163,7 +162,7 @@ def test_a_warning_is_one_line_without_a_place_in_our_code(
         raise UsageError("enough")
 
     usual = warnings.formatwarning
-    monkeypatch.setattr(run_command, "new_run_folder", warn)
+    monkeypatch.setattr("socialai_dsl.runs.train.new_run_folder", warn)
     assert run_main([*RUN, "--out", str(tmp_path / "run")]) == 2
     assert capsys.readouterr().out == "socialai-run: warning: mind the gap\n"
     assert warnings.formatwarning is usual

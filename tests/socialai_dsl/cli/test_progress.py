@@ -1,11 +1,15 @@
 """Progress without a terminal: plain lines, numbers that make sense."""
 
 import io
+from pathlib import Path
 
 import pytest
 
+import socialai_dsl
 from socialai_dsl.cli import progress
-from socialai_dsl.cli.progress import TrainingProgress
+from socialai_dsl.cli.progress import RunProgress
+from socialai_dsl.runs.folder import Run
+from socialai_dsl.runs.train import Progress
 
 
 class Clock:
@@ -22,9 +26,26 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def test_lines_are_rare_and_the_last_update_is_always_shown(clock: Clock) -> None:
+class Training:
+    """A run of so many frames, and what is shown of it behind its first line."""
+
+    def __init__(self, total: int, stream: io.StringIO, folder: Path) -> None:
+        self.total, self.run = total, Run(folder)
+        self.program = socialai_dsl.compile(socialai_dsl.load("help"))
+        self.shown = RunProgress(stream, "help")
+        self.shown.update(Progress(self.run, self.program, 0, total))
+        assert stream.getvalue() == f"help: 7 actions, 4 utterances, 9 words; writing to {folder}\n"
+        stream.seek(0)
+        stream.truncate()
+
+    def update(self, frames: int, success: float | None, speed: float) -> None:
+        self.shown.update(Progress(self.run, self.program, frames, self.total, success, speed))
+
+
+def test_lines_are_rare_and_the_last_update_is_always_shown(clock: Clock, tmp_path: Path) -> None:
     stream = io.StringIO()
-    with TrainingProgress(10_000, stream) as shown:
+    shown = Training(10_000, stream, tmp_path)
+    with shown.shown:
         for update in range(1, 101):
             clock.now = update * 0.1
             shown.update(update * 100, 0.5, 1000)
@@ -33,19 +54,21 @@ def test_lines_are_rare_and_the_last_update_is_always_shown(clock: Clock) -> Non
     assert lines[-1].split() == "10,000 of 10,000 frames 1,000 frames/s success 0.500 0:00 left".split()
 
 
-def test_a_slow_update_counts_for_the_time_it_took(clock: Clock) -> None:
+def test_a_slow_update_counts_for_the_time_it_took(clock: Clock, tmp_path: Path) -> None:
     """100 frames at 100/s and 100 at 300/s are 200 frames in 4/3 s."""
     stream = io.StringIO()
-    with TrainingProgress(9_200, stream) as shown:
+    shown = Training(9_200, stream, tmp_path)
+    with shown.shown:
         shown.update(100, None, 100)
         clock.now = 10.0
         shown.update(200, None, 300)
     assert stream.getvalue().split() == "200 of 9,200 frames 150 frames/s 1:00 left".split()
 
 
-def test_updates_in_which_no_episode_ended_do_not_spoil_the_success(clock: Clock) -> None:
+def test_updates_in_which_no_episode_ended_do_not_spoil_the_success(clock: Clock, tmp_path: Path) -> None:
     stream = io.StringIO()
-    with TrainingProgress(100, stream) as shown:
+    shown = Training(100, stream, tmp_path)
+    with shown.shown:
         shown.update(50, 0.25, 10)
         shown.update(100, None, 10)
     assert "success 0.250" in stream.getvalue()
@@ -56,9 +79,10 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_terminal_gets_one_line_that_is_redrawn() -> None:
+def test_a_terminal_gets_one_line_that_is_redrawn(tmp_path: Path) -> None:
     stream = Terminal()
-    with TrainingProgress(1000, stream) as shown:
+    shown = Training(1000, stream, tmp_path)
+    with shown.shown:
         for frames in range(100, 1100, 100):
             shown.update(frames, 0.5, 100)
     assert "100%" in stream.getvalue()

@@ -14,8 +14,10 @@ from PIL import Image
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.run import add_arguments
-from socialai_dsl.cli.run_options import new_config, usual_for
+from socialai_dsl.cli.run_options import typed_options
 from socialai_dsl.errors import UsageError
+from socialai_dsl.runs.folder import Run
+from socialai_dsl.runs.options import new_config, usual_options
 from trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
@@ -181,11 +183,11 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
 ) -> None:
     trained: list[RunConfig] = []
 
-    def train_agent(config: RunConfig, *_: object) -> None:
+    def train_agent(run: Run, config: RunConfig, *_: object) -> None:
         trained.append(config)
         raise UsageError("far enough")
 
-    monkeypatch.setattr("socialai_dsl.cli.training.train_agent", train_agent)
+    monkeypatch.setattr("socialai_dsl.runs.train._train", train_agent)
     assert run_main(["corridor.yaml", "--net", net, "--explo", "cell"]) == 2
     (config,) = trained
     usual = configure(config.recipe, net=net)
@@ -206,7 +208,7 @@ def test_the_automatic_bonus_is_the_paper_s() -> None:
     found = {}
     for name in BONUSES:
         typed = [name, "--bonus", "auto", "--recipe", "plain", "--device", "cpu"]
-        config, _ = new_config(parser.parse_args(typed))
+        config = new_config(name, typed_options(parser.parse_args(typed)), socialai_dsl.load(name))
         found[name] = (config.bonus, config.bonus_c)
     assert found == BONUSES
 
@@ -460,14 +462,14 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
     }.items():
         Path(f"{name}.yaml").write_text(text)
     loaded = {name: socialai_dsl.load(f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
-    usual = {name: usual_for("guided", one) for name, one in loaded.items()}
+    usual = {name: usual_options("guided", one) for name, one in loaded.items()}
     assert usual == {
         "corridor": {"frames": 1_000_000},
         "short": {"frames": 4096},
         "pair": {"frames": 8192, "curriculum": "even"},
         "acts": {"frames": 6_000_000},  # nothing is drawn that a curriculum could choose
     }
-    assert usual_for("plain", loaded["pair"]) == {"frames": 600_000}
+    assert usual_options("plain", loaded["pair"]) == {"frames": 600_000}
 
 
 @pytest.mark.thorough("trains twice")

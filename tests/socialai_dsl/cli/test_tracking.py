@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.cli.tracking import TrackingWarning, WandbTracker
+from socialai_dsl.runs.tracking import TrackingWarning, WandbTracker
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
 from trainer.ppo import train

@@ -11,7 +11,7 @@ import pytest
 from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.arguments import typed
-from socialai_dsl.experiments.document import config_of, differences, document_of
+from socialai_dsl.experiments.document import completed, config_of, differences, document_of
 from socialai_dsl.frontend import load, load_experiment
 from socialai_dsl.schema.experiment import NETS, Hyper, Settings
 
@@ -290,6 +290,7 @@ def test_a_guided_condition_takes_from_the_scenario_what_it_does_not_say(
     )
     loaded = load_experiment(file)
     (cell,) = loaded.cells[None]
+    cell = completed(cell, loaded.played[cell.scenario])
     frames = frames or load("social_env").suite.training_frames  # None: as its file says
     assert (cell.frames, config_of(cell).frames, config_of(cell).curriculum) == (frames, frames, curriculum)
     assert document_of(loaded, None)["conditions"][0]["frames"] == frames

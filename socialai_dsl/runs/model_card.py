@@ -7,7 +7,6 @@ from typing import Any, Final
 import yaml
 
 from socialai_dsl.evaluation.summary import ending_rows, summary_rows
-from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.runs.folder import scenario_folder_name
 from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
 from trainer.shipped import PREFIX
@@ -185,8 +184,19 @@ def _command(config: RunConfig) -> str:
     }
     given = {"recipe": config.recipe, **flags, "hyper": hyper}
     return " ".join(
-        ["socialai-run", config.scenario, *(w for name, value in given.items() for w in typed(name, value))]
+        ["socialai-run", config.scenario, *(w for name, value in given.items() for w in _typed(name, value))]
     )
+
+
+def _typed(name: str, value: Any) -> list[str]:
+    """The words by which an option is given: a switch alone, a mapping's option once for each of its keys."""
+    option = f"--{name.replace('_', '-')}"
+    if isinstance(value, Mapping):
+        given = (
+            f"{key}={each if isinstance(each, str) else json.dumps(each)}" for key, each in value.items()
+        )
+        return [word for pair in given for word in (option, pair)]
+    return [option] if value is True else [option, str(value)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

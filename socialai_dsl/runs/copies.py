@@ -1,101 +1,22 @@
-"""A trained agent as a folder that can be given to others."""
+"""Copies of what a run plays and loads, in a folder that is about it, so that the folder can be moved."""
 
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any
 
-import socialai_dsl
-from socialai_dsl.atomic import write_json, write_text
-from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, about_of
+from socialai_dsl.atomic import write_text
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.model_card import model_card
 from socialai_dsl.evaluation.scripts import script_of
+from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
-from socialai_dsl.runs.folder import CONFIG, RESULT, read_config
-from trainer.config import SCENARIO_FOLDER, RunConfig, scenario_in
-from trainer.shipped import WEIGHTS
-
-if TYPE_CHECKING:
-    from trainer.checkpoint import Checkpoint
-
-CARD: Final = "README.md"
-VOCABULARY: Final = "vocabulary.json"
-
-
-def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
-    """The configuration, the scenario and the network of a run's or an agent's folder.
-
-    Raises:
-        UsageError: it is not such a folder, it is not finished, or its agent was not trained.
-    """
-    from trainer import checkpoint as checkpoints
-    from trainer.errors import CheckpointError
-
-    config = read_config(run)
-    if not config.trains:
-        raise UsageError(f"{run}: the agent {config.agent!r} is not trained, there is nothing to export")
-    if not (run / RESULT).is_file():
-        raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
-    loaded = socialai_dsl.load(config.played)
-    try:
-        whole = checkpoints.read_agent(run)
-        weights = {name: value for name, value in whole.tensors.items() if name.startswith("net.")}
-        return config, loaded, checkpoints.Checkpoint(whole.meta, weights)
-    except CheckpointError as error:
-        raise UsageError(str(error)) from error
-
-
-def write_agent(
-    out: Path,
-    config: RunConfig,
-    loaded: Loaded,
-    checkpoint: "Checkpoint",
-    result: Mapping[str, Any],
-    agent: str = ".",
-) -> None:
-    """Write the folder of an agent: its weights, what they are for, its card, and the scenario unless that ships.
-
-    Args:
-        out: the folder, which is there.
-        config: of the run.
-        loaded: its scenario.
-        checkpoint: its network.
-        result: content of the run's `result.json`.
-        agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
-    """
-    from trainer import checkpoint as checkpoints
-
-    moved = MovedScenario.of(loaded, config.played)
-    moved.copy(out)
-    # Paths of this machine stay here.
-    kept = {"scenario": moved.scenario, "curriculum": _without_place(config.curriculum), "wandb": None}
-    written = config.model_copy(update=kept).within(Path())
-    code = config.own_files.get("net")
-    if code is not None:
-        there = out / written.code_folder / code.relative_to(config.code_folder.resolve())
-        there.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(code, there)
-    meta = checkpoint.meta.model_copy(update={"config": written})
-    checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
-    words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
-    write_json(out / VOCABULARY, words)
-    result = moved.told({**result, "scenario": moved.scenario})
-    write_text(out / CARD, model_card(written, result, about_of(loaded), agent, WEIGHTS))
-    write_json(out / CONFIG, written.model_dump())
-    write_json(out / RESULT, result)  # last, so that its presence means a complete folder
-
-
-def _without_place(text: str) -> str:
-    """A file's name without its folders; anything else as it is."""
-    return Path(text).name if text.endswith((".yaml", ".yml")) else text
-
-
-def _members(loaded: Loaded) -> Sequence[LoadedScenario]:
-    return loaded.members if isinstance(loaded, LoadedSuite) else ()
+from socialai_dsl.runs.folder import SCENARIO
+from trainer.config import RunConfig, scenario_in
 
 
 def keep_scenario(folder: Path, spec: str, loaded: Loaded) -> "MovedScenario":
@@ -119,7 +40,7 @@ def keep_scenario(folder: Path, spec: str, loaded: Loaded) -> "MovedScenario":
     moved.copy(folder)
     there = scenario_in(folder, moved.scenario)
     try:
-        same = socialai_dsl.compile(socialai_dsl.load(there)).sha256 == socialai_dsl.compile(loaded).sha256
+        same = compile_loaded(load(there)).sha256 == compile_loaded(loaded).sha256
     except ScenarioError:
         same = False
     if not same:
@@ -200,10 +121,10 @@ class MovedScenario:
                 continue
             if not there.is_relative_to(path.parent):
                 raise UsageError(f"{name}: lies outside the folder of {path.name}, so it cannot go along")
-            new = f"{SCENARIO_FOLDER}/{there.relative_to(path.parent).as_posix()}"
+            new = f"{SCENARIO}/{there.relative_to(path.parent).as_posix()}"
             texts[new] = file.text
             names[name] = names[str(there)] = names[there.name] = new
-        return cls(f"{SCENARIO_FOLDER}/{path.name}{rest}", texts, names)
+        return cls(f"{SCENARIO}/{path.name}{rest}", texts, names)
 
     def copy(self, out: Path) -> None:
         """Write the files."""
@@ -220,3 +141,7 @@ class MovedScenario:
         if isinstance(value, str):
             return self.names.get(value, Path(value).name if Path(value).is_absolute() else value)
         return value
+
+
+def _members(loaded: Loaded) -> Sequence[LoadedScenario]:
+    return loaded.members if isinstance(loaded, LoadedSuite) else ()

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import signal
+import threading
 from types import FrameType, TracebackType
 from typing import Final, Self
 
@@ -11,7 +12,9 @@ _MESSAGE: Final = b"\nstopping after this update, with a checkpoint; once more s
 
 
 class Stop:
-    """Remembers Ctrl-C or SIGTERM while a `with` statement lasts; a second one acts at once. For the main thread.
+    """Remembers Ctrl-C or SIGTERM while a `with` statement lasts; a second one acts at once.
+
+    Only the main thread gets signals: in others nothing is remembered.
 
     A signal that the process ignores, as one in the background of a shell ignores Ctrl-C, stays ignored.
     """
@@ -19,7 +22,9 @@ class Stop:
     def __init__(self) -> None:
         """Remember nothing yet."""
         self._number: int | None = None
-        self._before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        here = threading.current_thread() is threading.main_thread()
+        numbers = (signal.SIGINT, signal.SIGTERM) if here else ()
+        self._before = {number: signal.getsignal(number) for number in numbers}
 
     def __enter__(self) -> Self:
         for number, before in self._before.items():

@@ -1,0 +1,284 @@
+"""One run from its beginning to its end: trains an agent if it is to be trained, tests it, and writes its folder."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import traceback
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.atomic import write_json
+from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.envs.factory import compiled, make_vec
+from socialai_dsl.errors import OptionError, RunFailed, UsageError
+from socialai_dsl.evaluation.players import Player, folder_of, named_agent, require_trainer
+from socialai_dsl.evaluation.scripts import script_of, with_script
+from socialai_dsl.evaluation.testing import play_test_set
+from socialai_dsl.frontend import load
+from socialai_dsl.program_suite import Playable
+from socialai_dsl.replay.endings import endings_of, short_name
+from socialai_dsl.runs.copies import keep_run
+from socialai_dsl.runs.folder import (
+    CHECKPOINTS,
+    CONFIG,
+    LOCK_FILES,
+    RESULT,
+    Run,
+    new_run_folder,
+    only_writer,
+    scenario_folder_name,
+)
+from socialai_dsl.runs.learnt import Learnt
+from socialai_dsl.runs.options import continued_config, new_config
+from socialai_dsl.runs.outputs import draw_curve, record_run, training_figures, write_card
+from socialai_dsl.runs.stopping import Stop
+from socialai_dsl.runs.versions import versions
+from trainer.config import UNTRAINED, RunConfig
+from trainer.files import checkpoint_files
+
+if TYPE_CHECKING:
+    from socialai_dsl.runs.tracking import WandbTracker
+
+_AGENTS: Final = ("ppo", *UNTRAINED)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is. The first one comes before anything is trained, the next ones after each update.
+
+    Attributes:
+        run: its folder. program: what is played, compiled.
+        frames: trained so far, earlier parts of a resumed run included.
+        total: those that it will have been trained for; 0 of an agent that is not trained.
+        success: share of the episodes ended in this update that succeeded; None if none ended.
+        frames_per_second: of this update; 0 before the first.
+        learnt: what the agent has learnt so far, in words; empty where there is nothing to say.
+    """
+
+    run: Run
+    program: Playable
+    frames: int
+    total: int
+    success: float | None = None
+    frames_per_second: float = 0.0
+    learnt: str = ""
+
+
+Report = Callable[[Progress], None]
+"""Told how far a run is."""
+
+
+def train(
+    scenario: str | Path, *, out: str | Path | None = None, progress: Report | None = None, **options: Any
+) -> Run:
+    """Train an agent on a scenario, test it, and leave a folder of results, as `socialai-run` does.
+
+    The folder holds the configuration, the figures of each update, checkpoints, a copy of the scenario unless it ships,
+    the result of the test set, films, transcripts, a page that replays episodes, a learning curve and a model card.
+    Equal options on the same machine give runs equal to the bit. Ctrl-C ends training after the update at work, with a
+    checkpoint from which `resume` goes on.
+
+    Args:
+        scenario: a path or a name, with `+variants` and `?parameters`.
+        out: the folder of the run, which holds none yet (default: `runs/<scenario>/<time>-s<seed>`).
+        progress: called before training and after each update; nothing is printed.
+        options: of `trainer.config.RunConfig`, such as `frames=100_000`, `seed=1`, `net="paper"` or `lr=1e-4`; those
+            that are left out, `frames`, `recipe`, `device` and `threads` among them, follow from scenario and machine.
+            With `agent="random"`, `"oracle"` or the path of a trained agent nothing is trained: that agent is tested.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: an option is unknown or out of bounds, or the folder cannot be used (a ValueError).
+        RunFailed: training broke down; the last good checkpoint is in the folder.
+        KeyboardInterrupt: it was interrupted; the message says how to go on.
+        OSError: a file cannot be written.
+    """
+    require_trainer()
+    spec = str(scenario)
+    agent = named_agent(str(options.get("agent") or "ppo"), spec)
+    if agent not in _AGENTS and not folder_of(agent).exists():
+        known = ", ".join(_AGENTS)
+        raise OptionError("agent", f"expected {known}, shipped or the path of a checkpoint, got {agent!r}")
+    loaded = load(spec)
+    config = new_config(spec, {**options, "agent": agent}, loaded)
+    program = compiled(loaded)
+    with new_run_folder(None if out is None else Path(out), config.scenario, config.seed) as folder:
+        before = set(folder.iterdir())
+        copied: set[Path] = set()
+        try:
+            try:
+                config = keep_run(folder, config, loaded)
+            finally:
+                copied = set(folder.iterdir()) - before
+            return _perform(Run(folder), config, loaded, program, False, progress)
+        except (ScenarioError, UsageError, RunFailed):
+            if config.trains:
+                _discard_unstarted(folder, copied)
+            raise
+
+
+def resume(folder: str | Path, *, progress: Report | None = None, **options: Any) -> Run:
+    """Go on with a run that was stopped, or train one for longer, as `socialai-run --resume` does.
+
+    The weights are those of a run that never stopped, to the bit on the same processor with as many threads.
+
+    Args:
+        folder: of the run.
+        progress: see `train`.
+        options: what is to be different, such as `frames` or `threads`; none that changes what an update computes.
+
+    Raises:
+        UsageError: there is no such run, it is none that trains, or it cannot go on with these options.
+        ScenarioError, RunFailed, KeyboardInterrupt, OSError: see `train`.
+    """
+    require_trainer()
+    run = Run(Path(folder))
+    _resumable(run)  # so that no folder is made where there is none
+    with only_writer(run.folder):
+        config = continued_config(_resumable(run), options, run.folder)
+        loaded = load(config.played)
+        return _perform(run, config, loaded, compiled(loaded), True, progress)
+
+
+def _resumable(run: Run) -> RunConfig:
+    try:
+        config = run.config
+    except UsageError as error:
+        raise OptionError("resume", str(error)) from None
+    if not config.trains:
+        raise OptionError("resume", f"the agent {config.agent!r} of {run.folder} is not trained")
+    return config
+
+
+def _perform(
+    run: Run, config: RunConfig, loaded: Loaded, program: Playable, resumed: bool, progress: Report | None
+) -> Run:
+    """Train if the agent is to be trained, evaluate, write everything down."""
+    folder, agent = run.folder, config.agent
+    training: Mapping[str, Any] = {"frames": 0, "train_seconds": 0.0, "frames_per_second": None}
+    write_json(folder / CONFIG, config.model_dump())
+    report = progress or (lambda progress: None)
+    total = config.updates * config.frames_per_update if config.trains else 0
+    report(Progress(run, program, run.checkpoint_frames or 0, total))
+    if config.trains:
+        agent = str(_train(run, config, loaded, program, resumed, report))
+        training = training_figures(folder)
+    # What is trained differs by its training; what is not, by what it draws.
+    drawn = 0 if config.trains else config.seed
+    player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder, out=folder)
+    evaluation = play_test_set(player, config.played, loaded, program, config.eval_episodes)
+    for warning in evaluation.warnings:
+        warnings.warn(warning, stacklevel=3)
+    result = {
+        "scenario": config.scenario,
+        "agent": short_name(config.agent),
+        "seed": config.seed,
+        **({"recipe": config.recipe, "guide": config.guide} if config.trains else {}),
+        **training,
+        "eval": evaluation.figures(),
+        "program_sha256": program.sha256,
+        "versions": versions(),
+    }
+    record_run(evaluation, folder, f"agent {short_name(config.agent)}, seed {config.seed}")
+    if config.trains:
+        draw_curve(config, folder, result)
+        write_card(config, loaded, folder, Path(agent), result)
+    write_json(folder / RESULT, result)  # last, so that its presence means a complete run
+    return run
+
+
+def _train(
+    run: Run, config: RunConfig, loaded: Loaded, program: Playable, resumed: bool, report: Report
+) -> Path:
+    """Train the agent, and return the path of the final checkpoint.
+
+    Raises:
+        UsageError: the run cannot start, or its folder cannot be written.
+        RunFailed: training broke down.
+        KeyboardInterrupt: with a message that says how to go on.
+    """
+    from trainer.errors import TrainingStopped
+    from trainer.ppo import train
+
+    played = _played(config, loaded)
+    scenario = program if played is loaded else compiled(played)
+    envs = make_vec(scenario, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
+    total = config.updates * config.frames_per_update
+    learnt = Learnt(loaded, endings_of(loaded, program))
+
+    def updated(row: Mapping[str, Any]) -> None:
+        figures = row["frames"], total, row["success"], row["frames_per_second"]
+        report(Progress(run, program, *figures, learnt.sentence(row)))
+
+    try:
+        with Stop() as stop:
+            tracker = _tracker(config, run.folder)
+            trained = train(config, envs, run.folder, updated, resumed, tracker, program, stop.wished)
+        stop.heed()
+        return trained
+    except TrainingStopped as error:
+        raise RunFailed(str(error)) from error
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {run.folder}") from None
+    except Exception as error:
+        if (place := _place_in_own_code(config, error)) is not None:
+            raise UsageError(f"{place}: {type(error).__name__}: {error}") from error
+        if isinstance(error, ValueError):  # options or a checkpoint that do not fit
+            raise UsageError(str(error)) from error
+        raise
+    finally:
+        envs.close()
+
+
+def _played(config: RunConfig, loaded: Loaded) -> Loaded:
+    """What is played while training: where a guide leads, the variant with the script that it may follow."""
+    if config.guide == "none":
+        return loaded
+    if config.guide == "script":
+        return with_script(config.played, loaded).loaded
+    scripted = script_of(config.played, loaded)
+    return loaded if scripted is None else scripted.loaded
+
+
+def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:
+    """`file:line` where the user's network, bonus, curriculum or guide raised an error; None if none of them did."""
+    files = {str(file) for file in config.own_files.values()}
+    places = [
+        f"{frame.filename}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename in files
+    ]
+    return places[-1] if places else None
+
+
+def _tracker(config: RunConfig, folder: Path) -> WandbTracker | None:
+    """Where the figures go besides the folder, if anywhere."""
+    if config.wandb is None:
+        return None
+    from socialai_dsl.runs.tracking import WandbTracker
+
+    name = f"{scenario_folder_name(config.scenario)} {folder.name}"
+    return WandbTracker(config.wandb, folder, config.model_dump(), name)
+
+
+def _discard_unstarted(folder: Path, copied: Iterable[Path]) -> None:
+    """Take back the folder of a run that could not even begin, so that the same call can be made again.
+
+    Args:
+        folder: of the run.
+        copied: what was copied into it, which is removed.
+    """
+    checkpoints = folder / CHECKPOINTS
+    if not checkpoint_files(checkpoints):
+        for copy in copied:
+            shutil.rmtree(copy) if copy.is_dir() else copy.unlink()
+        for file in (CONFIG, *LOCK_FILES):
+            (folder / file).unlink(missing_ok=True)
+        for empty in (checkpoints, folder):
+            with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
+                empty.rmdir()
