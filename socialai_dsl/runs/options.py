@@ -88,7 +88,7 @@ def continued_config(config: RunConfig, options: Mapping[str, Any], folder: Path
         OptionError: an option is unknown or out of bounds, or the run cannot go on with it.
     """
     _refuse_unknown(options)
-    asked = resolved_config(config.model_dump() | options)
+    asked = resolved_config({**config.model_dump(), **options})
     asked = asked.model_copy(update={"device": resolved_device(asked.device)}).within(folder)
     if changed := config.differences(asked):
         name, reason = changed[0], "because a run goes on with the options it began with"
