@@ -75,7 +75,7 @@ CODES: Final[dict[str, str]] = {
     "W403": "a right answer that is not among those of the probe",
     "W404": "a probe with a single answer",
     "S405": "a text that is not one line, or a name that reads like two",
-    "W406": "texts that only people tell apart",
+    "W406": "texts that look alike and are not",
     # S5xx: variants, parameters and files that belong together
     "S501": "no such path in the scenario",
     "S502": "an added key that exists already",

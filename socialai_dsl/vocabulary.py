@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import product, takewhile
 from math import prod
 from typing import Final, Literal, get_args
 
@@ -43,9 +43,13 @@ _FINAL: Final = ".!?\u3002"
 """Marks that may end a sentence, the ideographic full stop among them; wide forms of the others are folded."""
 
 _UNSPACED: Final = re.compile(
-    "[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u3041-\u30ff\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
+    "[\u0e00-\u0eff\u1000-\u109f\ua9e0-\ua9ff\uaa60-\uaa7f\u1780-\u17ff\u3041-\u30ff\u31f0-\u31ff\U0001b000-\U0001b16f"
+    "\u3005-\u3007\u3021-\u3029\u3038-\u303b\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
 )
-"""Letters of scripts that put no blanks between words: Thai, Lao, Burmese, Khmer, Japanese, Chinese."""
+"""Letters of scripts that put no blanks between words: Thai, Lao, Myanmar, Khmer, Hiragana, Katakana, Han."""
+
+_LETTERS: Final = "'\u0345"
+"""What counts as a letter beside letters and digits; the latter is a mark that becomes a letter without case."""
 
 
 def composed(text: str) -> str:
@@ -80,21 +84,61 @@ def first_alike(text: str, known: dict[str, str]) -> str | None:
 def words(text: str) -> list[str]:
     """The folded maximal runs of letters, digits and apostrophes; each letter of a script without blanks by itself."""
     text = folded(text)
-    if text.isascii():
-        return _WORD.findall(text)
+    return _WORD.findall(text) if text.isascii() else [piece for piece in _cut(text) if _is_letter(piece[0])]
+
+
+def pieces(text: str) -> list[str]:
+    """The text as it looks, cut into its words as they are spelt, its other marks one by one, and single blanks."""
+    return _cut(" ".join(composed(text).split()))
+
+
+def telling_pieces(texts: Iterable[str]) -> list[str]:
+    """The pieces that tell texts apart which have the same words, in the order in which they appear.
+
+    Of the texts with the same words these are the pieces between what all of them begin and end with. So two texts that
+    do not look alike, blanks aside, have different `tokens`.
+    """
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for text in dict.fromkeys(texts):
+        alike.setdefault(tuple(words(text)), []).append(text)
+    found: dict[str, None] = {}
+    for group in (list(map(pieces, some)) for some in alike.values() if len(some) > 1):
+        begun = _shared(group)
+        rest = [one[begun:] for one in group]
+        ended = _shared([one[::-1] for one in rest])
+        found |= dict.fromkeys(piece for one in rest for piece in one[: len(one) - ended])
+    return list(found)
+
+
+def tokens(text: str, telling: Container[str]) -> list[str]:
+    """The words of a text, the `telling` pieces among them as they are written."""
+    return [token for piece in pieces(text) for token in ([piece] if piece in telling else words(piece))]
+
+
+def _shared(rows: Iterable[Sequence[str]]) -> int:
+    """How many entries all rows begin with."""
+    columns = (set(column) for column in zip(*rows, strict=False))
+    return sum(1 for _ in takewhile(lambda column: len(column) == 1, columns))
+
+
+def _cut(text: str) -> list[str]:
     found: list[str] = []
     open_ = False
     for character in text:
-        mark = unicodedata.category(character)[0] == "M"
-        letter = character.isalnum() or character == "'"
+        letter = _is_letter(character)
+        mark = not letter and unicodedata.category(character)[0] == "M"
         if open_ and (
             mark or (letter and not _UNSPACED.match(character) and not _UNSPACED.match(found[-1][0]))
         ):
             found[-1] += character
-        elif letter:
+        else:
             found.append(character)
         open_ = letter or (open_ and mark)
     return found
+
+
+def _is_letter(character: str) -> bool:
+    return character.isalnum() or character in _LETTERS
 
 
 def spelt(value: object) -> str:

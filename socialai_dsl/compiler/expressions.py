@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from math import prod
 from typing import Final
@@ -38,7 +39,7 @@ from socialai_dsl.program import Field, Op, Register, constant, is_temporary
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
-from socialai_dsl.vocabulary import normal, words
+from socialai_dsl.vocabulary import normal, telling_pieces, tokens, words
 from socialai_dsl.widths import UNSPOKEN
 
 _TESTS = {
@@ -414,7 +415,7 @@ class Lines:
 
     Attributes:
         texts: text of each line as the agent hears it. classes: utterance class to NPCs. nouns: what `<noun>` is in it,
-        -1 nothing. tokens: ids of its words.
+        -1 nothing.
         agent_says: 1 + number of the agent's utterance (0, 0) where the agent's utterances are lines; else 0.
         speakers: for each entity that says something, the numbers of its lines.
         kept_secret: the lines that the agent never hears, for they are said to others.
@@ -425,7 +426,6 @@ class Lines:
     texts: list[str] = field(default_factory=list)
     classes: list[int] = field(default_factory=list)
     nouns: list[int] = field(default_factory=list)
-    tokens: list[list[int]] = field(default_factory=list)
     agent_says: int = 0
     speakers: dict[int, set[int]] = field(default_factory=dict)
     kept_secret: set[int] = field(default_factory=set)
@@ -433,8 +433,6 @@ class Lines:
     def __post_init__(self) -> None:
         self._known: dict[tuple[int, tuple[str | Term, ...], Term | None], int] = {}
         self.grammar = self.checked.sentences.by_number()
-        self.vocabulary = (*UNSPOKEN, *self.checked.words_in_order)
-        self._ids = {word: number for number, word in enumerate(self.vocabulary)}
         if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
             self._add_agent()
 
@@ -459,8 +457,6 @@ class Lines:
         if to and to[0] != 0 and not self.checked.overheard:
             self.kept_secret.add(line)
         self.nouns.append(self.classes_of.noun_in(text))
-        # A text without a single word still has to be heard as something.
-        self.tokens.append([self._ids.get(word, UNKNOWN) for word in words(heard)] or [UNKNOWN])
         self.speakers.setdefault(speaker.number, set()).add(line)
         return line
 
@@ -475,7 +471,7 @@ class Lines:
     def adopt(self, other: Lines) -> None:
         """Number all lines as `other` does, which was made for the same scenario."""
         self.texts, self.classes, self.nouns = [*other.texts], [*other.classes], [*other.nouns]
-        self.tokens, self._known = [*other.tokens], dict(other._known)
+        self._known = dict(other._known)
         self.kept_secret = set(other.kept_secret)
         self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
 
@@ -637,11 +633,37 @@ class Lines:
             pairs.get(normal("".join(pieces))) for pieces in product(*(_choices(part) for part in line.parts))
         ]
 
+    @cached_property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Word of each token id, once all lines are known: those of the scenario, then what tells its lines apart."""
+        return tuple(dict.fromkeys((*UNSPOKEN, *self.checked.words_in_order, *self._telling)))
+
+    @cached_property
+    def tokens(self) -> list[list[int]]:
+        """The ids of the words of each line, once all lines are known."""
+        ids = {word: number for number, word in enumerate(self.vocabulary)}
+        said = (tokens(text, self._telling) if self._telling else words(text) for text in self.texts)
+        # A text without a single word still has to be heard as something.
+        return [[ids.get(word, UNKNOWN) for word in line] or [UNKNOWN] for line in said]
+
+    @cached_property
+    def _telling(self) -> list[str]:
+        """What tells the lines apart that the agent can hear, and the names of who says them."""
+        heard = set().union(*(self.speakers[speaker] for speaker in self._heard_speakers)) - self.kept_secret
+        lines = [self.texts[line] for line in sorted(heard)]
+        names = [line.partition(":")[0] for line in lines] if self.checked.names_shown else []
+        return telling_pieces([*names, *lines])
+
+    @property
+    def _heard_speakers(self) -> list[int]:
+        return [speaker for speaker in self.speakers if speaker != 0 or self.checked.own_voice]
+
     @property
     def history_length(self) -> int:
         """L: room for the longest history an episode can make, a multiple of 8 from 8 to 256."""
-        heard = [s for s in self.speakers if s != 0 or self.checked.own_voice]
-        longest = sum(max(len(self.tokens[line]) for line in self.speakers[s]) for s in heard)
+        longest = sum(
+            max(len(self.tokens[line]) for line in self.speakers[speaker]) for speaker in self._heard_speakers
+        )
         bound = max(self.checked.horizon * longest, max((len(t) for t in self.tokens), default=1))
         return max(8, min(MAX_TOKENS, -(-bound // 8) * 8))
 

@@ -65,9 +65,10 @@ from socialai_dsl.semantics.terms import (
     SitedTerm,
     Type,
 )
-from socialai_dsl.semantics.texts import words_in_order
+from socialai_dsl.semantics.texts import texts_in_order
 from socialai_dsl.source import DataPath, Node, Span
-from socialai_dsl.vocabulary import PRIMITIVES
+from socialai_dsl.vocabulary import PRIMITIVES, pieces
+from socialai_dsl.vocabulary import words as words_of
 from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
@@ -383,15 +384,20 @@ class _Run:
             possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
-        words = words_in_order(
+        texts = texts_in_order(
             self._symbols.sentences,
             names,
             [line for npc in self._symbols.cast if npc != AGENT for line in spoken.get(npc, {}).values()],
             [one.tone for one in inhabitants],
         )
-        if len(words) + len(UNSPOKEN) > MOST_WORDS:
+        words: dict[str, None] = {}
+        written: set[str] = set()
+        for text in texts:
+            words |= dict.fromkeys(words_of(text))
+            written.update(pieces(text))
+        if len(written | words.keys()) + len(UNSPOKEN) > MOST_WORDS:
             most = MOST_WORDS - len(UNSPOKEN)
-            message = f"its texts have {len(words):,} different words; at most {most:,} are told apart"
+            message = f"its texts have {len(words):,} words in {len(written):,} spellings; {most:,} can be told apart"
             findings.error("S106", message, findings.places.key_span(("scenario",)))
             return None
         return CheckedScenario(
@@ -404,7 +410,7 @@ class _Run:
             setup=in_order,
             frames=plans,
             outcomes=outcomes,
-            words_in_order=words,
+            words_in_order=tuple(words),
             npcs_hidden=scenario.observe.npcs == "hidden",
             picture_before_npcs=scenario.observe.image == "before_npcs",
             names_shown=scenario.observe.names == "shown",

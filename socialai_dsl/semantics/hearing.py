@@ -1,4 +1,4 @@
-"""Who seems to speak, and which texts only some of those who hear them tell apart: people, models, trained agents."""
+"""Who seems to speak, and which texts look alike and are not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from socialai_dsl.semantics.resolver import Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import surviving
 from socialai_dsl.semantics.terms import Line, Term
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import composed, words
+from socialai_dsl.vocabulary import composed
 
 Spoken = Mapping[str, Mapping[DataPath, Line]]
 """Member of the cast -> what it says, by place."""
@@ -43,39 +43,42 @@ def check_speakers(resolver: Resolver, spoken: Spoken) -> None:
 
 
 def report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> None:
-    """Warn of what people tell apart and a trained agent does not, which hears words alone (W406)."""
+    """Warn of texts that look alike and are not: a language model may tell them apart, and nobody else does (W406)."""
     findings, symbols = resolver.findings, resolver.symbols
-    called: dict[tuple[str, ...], tuple[str, str]] = {}
+    called: dict[str, tuple[str, str]] = {}
     for member, name in zip(symbols.cast, names, strict=True):
         for text in words_of_values(name.type):
-            first, known = called.setdefault(tuple(words(text)), (member, text))
-            if first != member and known != text:
+            first, known = called.setdefault(_as_it_looks(text), (member, _written(text)))
+            if first != member and known != _written(text):
                 message = (
-                    f"`{text}` and `{known}`, which `{first}` is called, are one name to a trained agent"
+                    f"`{text}` and `{known}`, which `{first}` is called, look alike and are not the same name"
                 )
-                _warn(resolver, message, text, findings.at(symbols.member_path(member, "name")))
-    heard: dict[tuple[str, tuple[str, ...]], tuple[str, Span]] = {}
+                _warn(resolver, message, findings.at(symbols.member_path(member, "name")))
+    heard: dict[tuple[str, str], tuple[str, Span]] = {}
     told: set[Span] = set()
     for member, lines in spoken.items():
         who = member if symbols.scenario.observe.names == "shown" else ""
         for line in _of_npcs({member: lines}):
             for text in texts_of(line):
-                known, span = heard.setdefault((who, tuple(words(text))), (_shown(text), line.span))
-                if known != _shown(text) and line.span not in told:
+                known, span = heard.setdefault((who, _as_it_looks(text)), (_written(text), line.span))
+                if known != _written(text) and line.span not in told:
                     told.add(line.span)
                     where = f"line {span.line}" if span.file == line.span.file else str(span)
-                    message = f'"{text}" and "{known}" ({where}) are the same to a trained agent'
-                    _warn(resolver, message, text, line.span)
+                    message = f'"{text}" and "{known}" ({where}) look alike and are not the same text'
+                    _warn(resolver, message, line.span)
 
 
-def _warn(resolver: Resolver, message: str, text: str, span: Span) -> None:
-    hears = " ".join(words(text)) or "none"
-    hint = f"it hears words alone, here {hears}; say what matters in words"
+def _warn(resolver: Resolver, message: str, span: Span) -> None:
+    hint = "spell them alike; an agent and a person take them for the same, a language model may not"
     resolver.findings.warning("W406", message, span, hint=hint)
 
 
-def _shown(text: str) -> str:
-    return " ".join(composed(text).split())
+def _as_it_looks(text: str) -> str:
+    return _written(composed(text))
+
+
+def _written(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _of_npcs(spoken: Spoken) -> Iterator[Line]:

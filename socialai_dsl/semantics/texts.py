@@ -702,13 +702,13 @@ def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
 # -- words -----------------------------------------------------------------------------------------------------
 
 
-def words_in_order(
+def texts_in_order(
     sentences: Sentences,
     names: Iterable[Term],
     lines: Sequence[Line],
     tones: Iterable[Term | None],
-) -> tuple[str, ...]:
-    """The words of the grammar, then of the names, of what each NPC can say, and of tones, by first appearance.
+) -> Iterator[str]:
+    """The texts of the grammar, then the names, what each NPC can say in pieces, and tones.
 
     What the agent says has words of the grammar only, so a scenario has the same words with a script and without.
 
@@ -718,7 +718,7 @@ def words_in_order(
         lines: of all NPCs, of each in the order of its frame.
         tones: the tone of each entity, None without one.
     """
-    texts = chain(
+    return chain(
         (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
         (word for slot in sentences.slots for word in slot.words),
         (word for name in names for word in words_of_values(name.type)),
@@ -726,7 +726,6 @@ def words_in_order(
         (word for tone in tones if tone is not None for word in tone.type.words),
         ("to" for line in lines if line.to is not None),
     )
-    return tuple(dict.fromkeys(word for text in texts for word in words(text)))
 
 
 def _pieces(line: Line) -> Iterator[str]:

@@ -288,7 +288,7 @@ class Reference:
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
-        self.history += [speech.words(self.line(heard)) for heard in self.world.lines]
+        self.history += [self.vocabulary.heard(self.line(heard)) for heard in self.world.lines]
         while sum(map(len, self.history)) > self.vocabulary.length:
             self.history.pop(0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -31,9 +32,17 @@ def noun_values(world: World) -> list[str | int]:
 
 def plain(text: str) -> str:
     """A text without case, in plain forms of its letters, and without what only tells how others are shown."""
-    forms = unicodedata.normalize("NFKC", text).casefold()
-    shown = [c for c in forms if unicodedata.category(c) != "Cf" and not 0xFE00 <= ord(c) <= 0xFE0F]
-    return unicodedata.normalize("NFKC", "".join(shown)).replace("\u2019", "'")
+    return shown(shown(text).casefold())
+
+
+def shown(text: str) -> str:
+    """A text as it looks."""
+    seen = [
+        c
+        for c in unicodedata.normalize("NFKC", text)
+        if unicodedata.category(c) != "Cf" and not 0xFE00 <= ord(c) <= 0xFE0F
+    ]
+    return "".join(seen).replace("\u2019", "'")
 
 
 def canonical(text: str) -> str:
@@ -139,17 +148,47 @@ def pair(world: World, grammar: Grammar, number: int) -> tuple[str, dict[str, An
     return grammar.utterance(*spoken), filled(world, grammar, *spoken)
 
 
-UNSPACED = ("THAI", "LAO", "MYANMAR", "KHMER", "HIRAGANA", "KATAKANA", "CJK")
+UNSPACED = (
+    *("THAI", "LAO", "MYANMAR", "KHMER", "HIRAGANA", "HENTAIGANA", "KATAKANA"),
+    *("CJK", "IDEOGRAPHIC", "VERTICAL IDEOGRAPHIC", "HANGZHOU"),
+)
 """How the names of letters begin in scripts without blanks."""
 
 
 def words(text: str) -> list[str]:
     """Runs of letters, digits and apostrophes, with their marks; letters of scripts without blanks stand alone."""
+    return [part for part in parts(plain(text)) if part[0].isalnum() or part[0] == "'"]
+
+
+def spelt(text: str, telling: Collection[str]) -> list[str]:
+    """The words of a line, but its telling parts as they are written."""
+    heard: list[str] = []
+    for part in parts(" ".join(shown(text).split())):
+        heard += [part] if part in telling else words(part)
+    return heard
+
+
+def parts(text: str) -> list[str]:
+    """A text cut into words and single characters between them."""
     pattern = ""
-    text = plain(text)
     for c in text:
         kind = unicodedata.category(c)[0]
-        letter = c.isalnum() or c == "'"
+        letter = c.isalnum() or c in "'\u0345"
         alone = letter and unicodedata.name(c, "").startswith(UNSPACED)
         pattern += "A" if alone else "L" if letter else "M" if kind == "M" else " "
-    return [text[m.start() : m.end()] for m in re.finditer("AM*|L[LM]*", pattern)]
+    return [text[m.start() : m.end()] for m in re.finditer("AM*|L[LM]*|.", pattern)]
+
+
+def telling_parts(lines: Iterable[str]) -> set[str]:
+    """The parts that differ in lines with the same words, between what all of these begin and end with."""
+    alike: dict[str, list[list[str]]] = {}
+    for line in lines:
+        alike.setdefault(" ".join(words(line)), []).append(parts(" ".join(shown(line).split())))
+    found: set[str] = set()
+    for group in alike.values():
+        while all(group) and len({one[0] for one in group}) == 1:
+            group = [one[1:] for one in group]
+        while all(group) and len({one[-1] for one in group}) == 1:
+            group = [one[:-1] for one in group]
+        found.update(part for one in group for part in one)
+    return found

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference.evaluate import weighed
 from tests.reference.script import Frame, Member, Script, Sequence
 from tests.reference.source import Sources, Value
-from tests.reference.speech import words
+from tests.reference.speech import spelt, telling_parts, words
 from tests.reference.world import COLORS, DIRECTIONS, default_name
 
 PADDING, UNKNOWN = 0, 1
@@ -22,10 +23,18 @@ Who = tuple[str, int]
 
 
 class Words:
-    """Words with the numbers that they were given, and how many are kept: 0 pads, 1 is unknown."""
+    """Words with the numbers that they were given, and how many are kept: 0 pads, 1 is unknown.
+
+    Those that are no words as they are heard tell lines apart.
+    """
 
     def __init__(self, ids: dict[str, int], length: int) -> None:
         self.ids, self.length = ids, length
+        self.telling = {word for word in ids if words(word) != [word]}
+
+    def heard(self, line: str) -> list[str]:
+        """The words of a line as they are heard."""
+        return spelt(line, self.telling)
 
     def tokens(self, heard: list[str]) -> list[int]:
         """The ids of words."""
@@ -43,6 +52,9 @@ class Vocabulary(Words):
         for text in self.in_order_of_appearance():
             for word in words(text):
                 self.ids.setdefault(word, len(self.ids) + 2)
+        self.telling = telling_parts(self.lines())
+        for part in sorted(self.telling):
+            self.ids.setdefault(part, len(self.ids) + 2)
         self.length = self.longest_history()
 
     def in_order_of_appearance(self) -> Iterator[str]:
@@ -64,6 +76,28 @@ class Vocabulary(Words):
         frames = self.scenario.frames.values()
         if any(rule.to is not None for frame in frames for rule in self.entries_of(frame)):
             yield "to"
+
+    def lines(self) -> Iterator[str]:
+        """All that the agent may hear, and the names of who says it."""
+        for name in self.members:
+            if name == "agent" and not self.scenario.observe.own_voice:
+                continue
+            texts = {text for who in self.who(name) for text in self.texts(who)}
+            tones = [f"({word}) " for word in self.tones(name)] or [""]
+            if self.scenario.observe.names == "hidden":
+                yield from (f"{tone}{text}" for tone, text in product(tones, texts))
+            elif texts:
+                names = self.names_of(name)
+                yield from names
+                yield from (f"{who}: {tone}{text}" for who, tone, text in product(names, tones, texts))
+
+    def texts(self, member: Who) -> Iterator[str]:
+        """All that a member may say."""
+        for value in self.sayings(member) if member[0] != "agent" else ():
+            yield from map("".join, product(*self.pieces(value.tree, member)))
+        if member[0] == "agent" or self.performs(member):
+            grammar = self.scenario.grammar
+            yield from (grammar.utterance(*spoken) for spoken in grammar.pairs())
 
     # -- what can be said ----------------------------------------------------------------------------------
 
@@ -398,27 +432,27 @@ class Vocabulary(Words):
     def longest_line(self, member: Who) -> int:
         """The words of a member's longest line, its name included; 0 if it says nothing."""
         lengths = [
-            sum(max(len(words(text)) for text in piece) for piece in self.pieces(value.tree, member))
+            sum(max(len(self.heard(text)) for text in piece) for piece in self.pieces(value.tree, member))
             for value in self.sayings(member)
         ]
         if self.performs(member):
             lengths.append(self.longest_utterance())
-        tone = max((len(words(text)) for text in self.tones(member[0])), default=0)
+        tone = max((len(self.heard(text)) for text in self.tones(member[0])), default=0)
         return self.longest_name(member[0]) + tone + max(lengths) if lengths else 0
 
     def longest_name(self, name: str) -> int:
         """The words before a member's lines; none where names are hidden."""
         if self.scenario.observe.names == "hidden":
             return 0
-        return max(len(words(text)) for text in self.names_of(name))
+        return max(len(self.heard(text)) for text in self.names_of(name))
 
     def longest_utterance(self) -> int:
         """The words of the longest utterance of the grammar."""
         grammar = self.scenario.grammar
         if grammar.slots:
-            return max(len(words(grammar.utterance(*spoken))) for spoken in grammar.pairs())
-        template = max(len(words(text.replace("<noun>", " "))) for text in grammar.templates)
-        return template + max(len(words(str(text))) for text in grammar.nouns)
+            return max(len(self.heard(grammar.utterance(*spoken))) for spoken in grammar.pairs())
+        template = max(len(self.heard(text.replace("<noun>", " "))) for text in grammar.templates)
+        return template + max(len(self.heard(str(text))) for text in grammar.nouns)
 
     def performs(self, member: Who) -> bool:
         """Whether it may say what the grammar has: whoever performs a sequence."""

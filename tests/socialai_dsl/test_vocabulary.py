@@ -1,16 +1,19 @@
 """How texts are compared is the same for checking a file and for playing it."""
 
+import json
 import unicodedata
+from itertools import combinations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.vocabulary import first_alike, normal, words
-from tests.reference.speech import canonical
+from socialai_dsl.vocabulary import composed, first_alike, normal, telling_pieces, tokens, words
+from tests.reference.speech import canonical, spelt, telling_parts
 from tests.reference.speech import words as spelled
+from tests.test_same_world import differ_alike
 from tests.tiny import Folder
 
 
@@ -93,3 +96,53 @@ def test_blanks_do_not_count_in_what_a_script_says_and_others_hear(tmp_path: Pat
     )
     episode.act(episode.env.unwrapped.scripted_action()).step()
     assert "Porter: Welcome  back" in episode.info["history"]
+
+
+PARTS = st.sampled_from(
+    [
+        *"aA1'?!,- .",
+        "ab",
+        "Ab",
+        "AB",
+        "\u00e9",
+        "\u00c9",
+        "\u4f60",
+        "\U0001f642",
+        "\u0345",
+        "\u00df",
+        "ss",
+        "\uff01",
+    ]
+)
+
+
+@given(st.lists(st.lists(PARTS, max_size=8).map("".join) | st.text(max_size=8), min_size=2, max_size=6))
+def test_lines_differ_as_tokens_exactly_if_they_differ_as_they_look(lines: list[str]) -> None:
+    """Blanks count as one; what the words of lines tell apart already needs no other token; so says the reference."""
+    telling = telling_pieces(lines)
+    looks = {line: " ".join(composed(line).split()) for line in lines}
+    heard = {line: tuple(tokens(line, telling)) for line in lines}
+    for one, other in combinations(lines, 2):
+        assert (heard[one] == heard[other]) == (looks[one] == looks[other])
+        assert words(one) == words(other) or heard[one] != heard[other]
+    if len({tuple(words(line)) for line in lines}) == len(set(looks.values())):
+        assert telling == []
+        assert all(tokens(line, telling) == words(line) for line in lines)
+    assert set(telling) == telling_parts(lines)
+    assert [spelt(line, telling) for line in lines] == [[*heard[line]] for line in lines]
+
+
+LINES = st.text("aAb!?,- ", min_size=1, max_size=5).filter(str.strip)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(lines=st.lists(LINES, min_size=2, max_size=3), names=st.sampled_from(["shown", "hidden"]))
+def test_programs_tell_lines_apart_as_they_look(tmp_path: Path, lines: list[str], names: str) -> None:
+    rules = [{"when": f"t == {t + 1}", "say": f'"{line}"'} for t, line in enumerate(lines)]
+    content = {
+        "observe": {"names": names},
+        "frames": {"talk": {"states": {"a": {"then": rules}}}},
+        "cast": {"ann": {"frame": "talk", "at": [2, 2]}},
+    }
+    episode = Folder(tmp_path)("\n".join(f"{key}: {json.dumps(one)}" for key, one in content.items()))
+    assert differ_alike(episode.env.unwrapped.program)

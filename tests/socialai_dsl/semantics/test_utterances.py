@@ -105,9 +105,9 @@ def test_whatever_is_said_or_named_is_one_line(examine, place, text):
     [
         ("Ann", "Bob", []),
         ("Ann", "Ann", []),
-        ("Ann", "ANN", ["W406"]),
+        ("Ann", "ANN", []),
         ("Ann", "\uff21nn", ["W406"]),
-        ('"\U0001f98a"', '"\U0001f43b"', ["W406"]),
+        ('"\U0001f98a"', '"\U0001f43b"', []),
         ('"Bob: Ann"', "Bob", ["S405"]),
         ('"Bob\uff1a Ann"', "Bob", ["S405"]),
     ],
@@ -120,14 +120,16 @@ def test_names_are_one_speaker_to_all_who_hear_them(examine, name, others, codes
 @pytest.mark.parametrize(
     ("lines", "names", "codes"),
     [
-        (("Yes!", "Yes?"), "shown", ["W406"]),
+        (("Yes!", "Yes?"), "shown", []),
+        (("Yes!", "Yes\uff01"), "shown", ["W406"]),
         (("Yes", "Yes"), "shown", []),
         (("Yes", "No"), "shown", []),
-        (("\U0001f642", "\U0001f641"), "shown", ["W406"]),
-        (("Caf\u00e9", "Cafe\u0301"), "shown", []),
+        (("by the way", "by  the way"), "shown", []),
+        (("by the way", "by\u200d the way"), "shown", ["W406"]),
+        (("Caf\u00e9", "Cafe\u0301"), "shown", ["W406"]),
     ],
 )
-def test_texts_that_only_people_tell_apart(examine, lines, names, codes):
+def test_texts_that_look_alike_and_are_not(examine, lines, names, codes):
     first, second = ({"hears": "How are you", "when": f"t == {t}", "say": say} for t, say in enumerate(lines))
     frames = {"talk": {"states": {"a": {"then": [first, second]}}}}
     found = examine(frames=frames, cast={"guide": {"frame": "talk"}}, observe={"names": names}).diagnostics
@@ -138,7 +140,7 @@ def test_texts_that_only_people_tell_apart(examine, lines, names, codes):
 def test_who_says_it_tells_texts_apart_unless_names_are_hidden(examine, who, codes):
     frames = {
         name: {"states": {"a": {"then": [{"hears": "How are you", "say": say}]}}}
-        for name, say in (("first", "Yes!"), ("second", "Yes?"))
+        for name, say in (("first", "Yes!"), ("second", "Yes\uff01"))
     }
     cast = {"guide": {"frame": "first"}, "other": {"frame": "second"}}
     found = examine(frames=frames, cast=cast, observe={"names": who}).diagnostics
