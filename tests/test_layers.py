@@ -84,18 +84,23 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"program", "program_suite", "compilation", "envs", "render"},
         {"numpy", "pydantic", "PIL"},
     ),
+    "episodes": (
+        TEXT_SIDE | {"", "errors", "program", "program_suite", "envs", "render", "replay"},
+        {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
+    ),
     "play": (
-        TEXT_SIDE | {"", "errors", "program", "program_suite", "engine", "envs", "render", "replay"},
+        TEXT_SIDE
+        | {"", "errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"},
         {"numpy", "rich", "textual"},
     ),
     "evaluation": (
         TEXT_SIDE
         | {"", "errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
-        | {"replay", "llm", "play", "experiments", "runs.folder", "runs.versions"},
+        | {"episodes", "replay", "llm", "play", "experiments", "runs.folder", "runs.versions"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
     "llm": (
-        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "render"},
+        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "episodes", "render"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
     "runs.options": (
@@ -104,7 +109,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "runs": (
         TEXT_SIDE
-        | {"errors", "atomic", "program_suite", "compilation", "envs", "replay", "evaluation", "reporting"}
+        | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "replay", "evaluation"}
+        | {"reporting"}
         | {"runs.folder", "runs.options", "runs.versions"},
         {"yaml", "trainer"},
     ),
@@ -135,7 +141,7 @@ FACADE = {"socialai_dsl"} | {
         "compile",
         "make",
         "make_vec",
-        "evaluation.episodes",
+        "episodes.policies",
         "schema.curriculum",
     )
 }

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.evaluation.players import Player
-from socialai_dsl.evaluation.testing import evaluate_agent
+from socialai_dsl.episodes.players import Player
+from socialai_dsl.evaluation.test_set import evaluate
 from trainer.config import RunConfig
 from trainer.ppo import train
 
@@ -36,7 +36,7 @@ def test_every_field_of_a_row_is_named_in_its_order(tmp_path: Path) -> None:
 
 
 def test_every_figure_of_an_evaluation_is_named_in_its_order() -> None:
-    figures = evaluate_agent(Player("oracle"), "social_env", 20).figures()
+    figures = evaluate(Player("oracle"), "social_env", 20).figures()
     assert list(figures) == tables()[1]
 
 

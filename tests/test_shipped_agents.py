@@ -12,7 +12,8 @@ from safetensors import safe_open
 import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.evaluation import evaluate, players
+from socialai_dsl.episodes import players
+from socialai_dsl.evaluation import evaluate_policy
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.shipped import IDS
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
@@ -45,7 +46,7 @@ def figures_of(name: str) -> tuple[float, dict[str, Any]]:
 def test_an_agent_plays_as_its_card_says(name: str) -> None:
     """The same rooms and the same random numbers: only the rounding of another machine can differ."""
     envs = socialai_dsl.make_vec(name, num_envs=125, copy=False, autoreset_mode="Disabled")
-    result = evaluate(CheckpointPolicy.load(PREFIX + name, envs), envs, EPISODES)
+    result = evaluate_policy(CheckpointPolicy.load(PREFIX + name, envs), envs, EPISODES)
     promised, recorded = figures_of(name)
     assert recorded["eval"]["episodes"] == EPISODES
     assert promised == pytest.approx(recorded["eval"]["success_rate"], abs=1e-4)

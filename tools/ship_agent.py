@@ -40,9 +40,9 @@ import torch
 import socialai_dsl
 from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.episodes.players import Player
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import Player
-from socialai_dsl.evaluation.testing import Evaluation, evaluate_agent
+from socialai_dsl.evaluation.test_set import Evaluation, evaluate
 from socialai_dsl.runs.copies import MovedScenario
 from socialai_dsl.runs.export import finished_agent, write_agent
 from socialai_dsl.runs.folder import CONFIG, RESULT
@@ -174,9 +174,9 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
         place = Path(temporary) / "agent"
         place.mkdir()
         checkpoints.write_file(place / WEIGHTS, small)
-        single = evaluate_agent(Player(str(run)), name, EPISODES)
+        single = evaluate(Player(str(run)), name, EPISODES)
         require_same(single, result["eval"])
-        half = evaluate_agent(Player(str(place)), name, EPISODES)
+        half = evaluate(Player(str(place)), name, EPISODES)
         compared = result.get("half_precision") or {
             **compare(single.result.success, half.result.success),
             "identical": identical(single, half),

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 import socialai_dsl
-from socialai_dsl.evaluation.episodes import Observation, Streams
+from socialai_dsl.episodes.policies import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta
@@ -45,6 +45,7 @@ class CheckpointPolicy:
         self._streams = Streams(seed)
         self._actor: Actor | None = None
         self._memory = net.memory.initial(1)
+        self._last: tuple[torch.Tensor, torch.Tensor] | None = None
 
     @classmethod
     def load(
@@ -102,10 +103,18 @@ class CheckpointPolicy:
         chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
         return chosen[0] if alone else chosen
 
-    @torch.no_grad()
-    def think(self, observation: Observation) -> tuple[list[list[float]], float]:
-        """The probabilities of each head's choices, and the expected return; the observation enters the memory."""
-        logits, values = self._look(observation, alone=True)
+    def thought(self) -> tuple[list[list[float]], float]:
+        """What the agent made of the first room's last observation.
+
+        Returns:
+            For each head the probability of each of its choices, and the expected return.
+
+        Raises:
+            ValueError: `act` was not called yet.
+        """
+        if self._last is None:
+            raise ValueError("thought: got a call before `act`; expected one after it")
+        logits, values = self._last
         parts = torch.split(logits[0], list(self.net.spec.action_sizes))
         return [torch.softmax(part, -1).tolist() for part in parts], float(values[0])
 
@@ -119,8 +128,8 @@ class CheckpointPolicy:
             self._actor = Actor(self.net, tokens.shape[1])
         _, features = self._actor.see(images, tokens)
         output, self._memory = self.net.memory.step(features, self._memory)
-        found: tuple[torch.Tensor, torch.Tensor] = self.net.heads(output)
-        return found
+        self._last = self.net.heads(output)
+        return self._last
 
     def _require(self, count: int) -> None:
         """Begin with an empty memory if another number of environments is played now."""

@@ -7,7 +7,7 @@ entries of `steps` a frame has gone through, from its register before and after 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.vector_env import Observation, ScenarioVectorEnv
+from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.program import FrameColumn, Header, Program
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
 from socialai_dsl.source import Span
@@ -45,49 +44,6 @@ class Tally:
     times: Counter[TallyItem]
     endings: Counter[str]
     episodes: int
-
-
-def tally(
-    envs: ScenarioVectorEnv,
-    scenarios: Sequence[CheckedScenario],
-    choose: Callable[[Observation], NDArray[np.int64]],
-    begin: Callable[[NDArray[np.bool_], NDArray[np.int64]], None],
-    episodes: int,
-    seed: int,
-    clock: Clock,
-) -> Tally:
-    """Play a number of episodes, each to its end, and count. What happens in episodes that the clock breaks off counts.
-
-    Args:
-        envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
-        scenarios: what the programs of the environments were compiled from.
-        choose: actions, int64 (E, 3 + slots), for an observation.
-        begin: is told in which environments an episode begins, bool (E,), and their numbers, int64 (E,), before
-            `choose` is asked.
-        episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
-        seed: of the environments.
-        clock: when to stop early, and where progress is reported.
-    """
-    watch, ended = _Watch(envs, scenarios), 0
-    with clock.until_interrupted():
-        for first in range(0, episodes, envs.num_envs):
-            playing = np.arange(envs.num_envs) < episodes - first
-            numbers = np.arange(first, first + envs.num_envs)
-            options = {"index": numbers, "reset_mask": playing}
-            observation, _ = envs.reset(seed=seed, options=options)
-            begin(playing, numbers)
-            watch.began(playing)
-            while playing.any() and not clock.is_over:
-                watch.before()
-                observation, _, terminated, truncated, _ = envs.step(choose(observation))
-                watch.after(playing)
-                over = playing & (terminated | truncated)
-                playing &= ~over
-                ended += int(np.count_nonzero(over))
-            if clock.is_over:
-                break
-            clock.progress(f"{ended} of {episodes} episodes played")
-    return watch.tally(ended)
 
 
 def parts_of(checked: CheckedScenario) -> Iterator[TallyItem]:
@@ -121,8 +77,13 @@ def _rule(frame: FramePlan, rule: Any) -> TallyItem:
     return TallyItem(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."))
 
 
-class _Watch:
-    """Looks at the frames of environments while they are played, and at the engine's counters in the end."""
+class Watch:
+    """Looks at the frames of environments while they are played, and at the engine's counters in the end.
+
+    Args:
+        envs: environments that nobody has played yet.
+        scenarios: what their programs were compiled from.
+    """
 
     def __init__(self, envs: ScenarioVectorEnv, scenarios: Sequence[CheckedScenario]) -> None:
         self._table = envs._table
@@ -133,28 +94,33 @@ class _Watch:
         self._keys = self._table.state.keys.copy()
 
     def began(self, rows: NDArray[np.bool_]) -> None:
-        """Episodes have begun in these rows."""
+        """Episodes have begun in these rows, bool (E,)."""
+        self._entered(rows)
+        self._remember()
+
+    def stepped(self, rows: NDArray[np.bool_]) -> None:
+        """A step has been taken in these rows, bool (E,)."""
+        state, played = self._table.state, self._table.batch.program_numbers()
+        turned = rows & (state.keys[:, Key.ACT] != self._keys[:, Key.ACT])
+        if turned.any():
+            self._entered(turned)
+        for number, frames in enumerate(self._programs):
+            own = rows & ~turned & (played == number)
+            frames.moved(self._registers[own], state.registers[own])
+        self._remember()
+
+    def _entered(self, rows: NDArray[np.bool_]) -> None:
         registers, played = self._table.state.registers, self._table.batch.program_numbers()
         for number, frames in enumerate(self._programs):
             frames.entered(registers[rows & (played == number)])
 
-    def before(self) -> None:
-        """A step is going to be taken."""
+    def _remember(self) -> None:
+        """Keep the state, to compare that after the next step with."""
         self._registers[:] = self._table.state.registers
         self._keys[:] = self._table.state.keys
 
-    def after(self, rows: NDArray[np.bool_]) -> None:
-        """A step has been taken in these rows."""
-        state, played = self._table.state, self._table.batch.program_numbers()
-        turned = rows & (state.keys[:, Key.ACT] != self._keys[:, Key.ACT])
-        if turned.any():
-            self.began(turned)
-        for number, frames in enumerate(self._programs):
-            own = rows & ~turned & (played == number)
-            frames.moved(self._registers[own], state.registers[own])
-
     def tally(self, episodes: int) -> Tally:
-        """The counts so far."""
+        """The counts so far, of so many episodes that are over."""
         times: Counter[TallyItem] = Counter()
         endings: Counter[str] = Counter()
         counters = self._table.batch.counters

@@ -14,8 +14,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_options
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import (
+from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
     MODEL_PREFIX,
     Player,
@@ -24,9 +23,10 @@ from socialai_dsl.evaluation.players import (
     require_trainer,
     session_folder,
 )
+from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.recordings import write_recordings
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
-from socialai_dsl.evaluation.testing import Evaluation, own_scenario, play_test_set
+from socialai_dsl.evaluation.test_set import Evaluation, own_scenario, play_test_set
 from socialai_dsl.replay.endings import short_name
 from socialai_dsl.runs.copies import keep_scenario
 from socialai_dsl.runs.folder import CONFIG, REPLAY, RESULT, only_writer, scenario_folder_name

@@ -15,8 +15,8 @@ from socialai_dsl.cli.experiment_document import asked_for, threads, workers
 from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import status_figures, status_text
 from socialai_dsl.cli.terminal import json_text
+from socialai_dsl.episodes.players import require_trainer
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import require_trainer
 from socialai_dsl.experiments.document import differences
 from socialai_dsl.experiments.driver import drive
 from socialai_dsl.experiments.engines import Engine, MissingEngineError

@@ -8,7 +8,7 @@ from typing import Any, Final
 from socialai_dsl.cli.arguments import identifier, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.evaluation.players import HUMAN_FOLDER, session_folder
+from socialai_dsl.episodes.players import HUMAN_FOLDER, session_folder
 from socialai_dsl.runs.folder import scenario_folder_name
 
 SUMMARY: Final = "play a scenario in the terminal"

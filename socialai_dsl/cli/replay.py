@@ -14,7 +14,7 @@ from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.runs.folder import CONFIG, REPLAY
 
 if TYPE_CHECKING:
-    from socialai_dsl.evaluation.testing import Evaluation
+    from socialai_dsl.evaluation.test_set import Evaluation
     from socialai_dsl.replay import Trace
 
 SUMMARY: Final = "write a web page to watch episodes step by step, with rules and reasons"
@@ -138,10 +138,10 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
-    from socialai_dsl.evaluation.players import MODEL_PREFIX, Player, folder_of, named_agent
-    from socialai_dsl.evaluation.scripts import script_of
-    from socialai_dsl.evaluation.testing import (
-        evaluate_agent,
+    from socialai_dsl.episodes.players import MODEL_PREFIX, Player, folder_of, named_agent
+    from socialai_dsl.episodes.scripts import script_of
+    from socialai_dsl.evaluation.test_set import (
+        evaluate,
         evaluation_of_model,
         evaluation_of_person,
         own_scenario,
@@ -173,4 +173,4 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
             )
         if agent in UNTRAINED:
             refuse(arguments, ("greedy",), f"the agent {agent!r} has no use for it")
-    return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)
+    return evaluate(Player(agent, greedy=arguments.greedy), scenario, episodes)

@@ -96,8 +96,8 @@ def _baselines(
     experiment: "Experiment", file: Path, only_known: bool
 ) -> "tuple[dict[str, Baselines], list[str]]":
     """Baselines by scenario, from an earlier report or measured now, and remarks."""
+    from socialai_dsl.episodes.players import require_trainer
     from socialai_dsl.evaluation.levels import read_baselines, update_baselines
-    from socialai_dsl.evaluation.players import require_trainer
 
     if only_known:
         return read_baselines(file), []

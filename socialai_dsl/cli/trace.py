@@ -2,18 +2,17 @@
 
 import argparse
 import sys
-from collections import deque
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from socialai_dsl.cli.arguments import episode, natural, positive, refuse, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.cli.trace_text import Text
+from socialai_dsl.cli.trace_text import Steps, Text
 from socialai_dsl.diagnostics import suggested
+from socialai_dsl.episodes.traces import TracedEpisode, reset_of
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.episode_trace import EpisodeTracer, Trace, TraceStep, reset_of
 
 SUMMARY: Final = "print one episode step by step: the rules that fired, and why the others did not"
 
@@ -84,38 +83,27 @@ def execute(arguments: argparse.Namespace) -> Exit:
     reset = reset_of(drawn, arguments.index, arguments.test_episode, arguments.layout)
     if arguments.json and (arguments.why or arguments.first > 1):
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
-    traced = EpisodeTracer(arguments.scenario, arguments.agent, arguments.do, drawn)
+    played = TracedEpisode(arguments.scenario, arguments.agent, arguments.do, drawn)
     try:
-        trace = traced.begin(reset)
-        _check_names(arguments.why, trace)
-        steps = _window(traced.steps(trace), arguments.first, arguments.steps)
+        _check_names(arguments.why, played.names())
+        last = None if arguments.steps is None else arguments.first + arguments.steps - 1
         if arguments.json:
-            deque(steps, maxlen=0)
-            print(traced.document().as_json())
-            return Exit.GOOD
-        text = Text(arguments.why, shows_color(sys.stdout))
-        print("\n".join(text.head(trace)), flush=True)
-        for step in steps:
-            print("\n".join(text.step(step)), flush=True)
-        print("\n".join(text.end(trace)))
+            steps = Steps()
+            played.play(reset, [steps], lambda: steps.t == last)
+            print(played.document().as_json())
+        else:
+            text = Text(played, arguments.why, shows_color(sys.stdout), arguments.first)
+            played.play(reset, [text], lambda: text.t == last)
+            print("\n".join(text.end()))
     finally:
-        traced.close()
+        played.close()
     return Exit.GOOD
 
 
-def _check_names(names: list[str], trace: Trace) -> None:
-    known = [*trace.names, "world", "outcome"]
-    groups = {name.partition("[")[0] for name in trace.names}
-    for name in names:
+def _check_names(asked: Sequence[str], cast: Sequence[str]) -> None:
+    known = [*cast, "world", "outcome"]
+    groups = {name.partition("[")[0] for name in cast}
+    for name in asked:
         if name not in known and name not in groups:
             hint = suggested(name, known, f"; expected one of {', '.join(known)}", repr)
             raise UsageError(f"--why: got {name!r}{hint}")
-
-
-def _window(steps: Iterator[TraceStep], first: int, count: int | None) -> Iterator[TraceStep]:
-    """The steps from `first` on, at most `count` of them."""
-    for step in steps:
-        if step.t >= first:
-            yield step
-        if count is not None and step.t >= first + count - 1:
-            return

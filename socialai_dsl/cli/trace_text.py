@@ -2,12 +2,18 @@
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.evaluation.episode_trace import Trace, TraceStep, is_among
-from socialai_dsl.replay.state import found, present
+from socialai_dsl.episodes.play import Observer, Rooms, Step
+from socialai_dsl.episodes.traces import TracedEpisode
+from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.replay.state import cast_of, changes, found, present
 from socialai_dsl.vocabulary import spelt
 
 _WIDTH: Final = 100
@@ -17,61 +23,99 @@ _QUIET: Final = ("facing", "at", "clock", "poked", "last")
 """Ends of addresses that the picture or the list of those present shows already, or that only count."""
 
 
-class Text:
-    """Writes lines.
+class Steps(Observer):
+    """Counts the steps of an episode.
 
-    Args:
-        names: the members whose rules are shown, with every reason; none: all, with what an author asks for most.
-        color: whether the output is a terminal.
+    Attributes:
+        t: how many were played.
     """
 
-    def __init__(self, names: Sequence[str], color: bool) -> None:
-        self._names, self._color = names, color
-        self._cast: tuple[str, ...] = ()
+    t = 0
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self.t += 1
+
+
+@dataclass(frozen=True)
+class _StepFacts:
+    """What is printed of a step: the state after it, and the rules, as `explain` gives them."""
+
+    state: dict[str, Any]
+    fired: list[dict[str, Any]]
+    others: list[dict[str, Any]]
+
+
+class Text(Steps):
+    """Prints an episode while it is played.
+
+    Args:
+        played: the episode.
+        names: the members whose rules are shown, with every reason; none: all, with what an author asks for most.
+        color: whether the output is a terminal.
+        first: the first step that is shown.
+    """
+
+    def __init__(self, played: TracedEpisode, names: Sequence[str], color: bool, first: int = 1) -> None:
+        self._played, self._names, self._color, self._first = played, names, color, first
         self._told: dict[tuple[str, str], str] = {}
+        self._state: dict[str, Any] = {}
+        self._reward = 0.0
+        self._end = ""
 
-    def head(self, trace: Trace) -> list[str]:
-        """The scenario, and the room before the first step."""
-        self._cast = trace.cast
-        member = f": {trace.member}" if trace.member is not None else ""
-        title = printable(f"{trace.scenario}, {trace.origin}, agent {trace.agent}{member}")
-        return [
-            *(self._paint(title, _BOLD), ""),
-            *_beside(trace.picture, present(self._cast, trace.state)),
-            "",
-        ]
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """Print the scenario, and the room before the first step."""
+        env, self._state = rooms.env, rooms.env.describe()
+        member = f": {rooms.info['member']}" if "member" in rooms.info else ""
+        played = self._played
+        title = printable(f"{played.scenario}, {played.origin()}, agent {played.agent}{member}")
+        seen = _beside(env.plain_text(), present(cast_of(env.playing), self._state))
+        print("\n".join([self._paint(title, _BOLD), "", *seen, ""]), flush=True)
 
-    def step(self, step: TraceStep) -> list[str]:
-        """One step."""
-        self._cast = step.cast
-        said = f', says "{step.said}"' if step.said is not None else ""
-        facts = [f"agent   {step.action}{said}", *(f"heard   {line}" for line in step.heard)]
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """Print a step."""
+        super().stepped(rooms, step)
+        self._reward += float(step.reward[0])
+        if step.ended[0]:
+            verdict = "success" if step.success[0] else "no success"
+            self._end = f"{verdict} ({printable(outcome_name(step.info))})"
+        before, self._state = self._state, rooms.env.describe()
+        if self.t >= self._first:
+            print("\n".join(self._lines(rooms.env, step, before)), flush=True)
+
+    def end(self) -> list[str]:
+        """How it ended, or that it has not."""
+        return [f"{self._end or 'not ended'} after {self.t} steps, reward {self._reward:.3f}"]
+
+    def _lines(self, env: Any, step: Step, before: dict[str, Any]) -> list[str]:
+        explained, after = env.explain(), self._state
+        done = after.get("last", {"action": "none", "said": None})  # gone where another act has begun
+        said = f', says "{done["said"]}"' if done["said"] is not None else ""
+        heard = () if step.info["utterance"] == "NA" else step.info["utterance"].splitlines()
+        facts = [f"agent   {done['action']}{said}", *(f"heard   {line}" for line in heard)]
         facts += [
             f"changed {address}: {spelt(old)} -> {spelt(new)}"
-            for address, (old, new) in step.changed.items()
+            for address, (old, new) in changes(before, after).items()
             if address.rpartition(".")[2] not in _QUIET
         ]
-        if step.reward:
-            facts.append(f"reward  {step.reward:.3f}")
-        facts += ["", *present(self._cast, step.state)]
-        title = f"-- step {step.t} "
-        lines = [self._paint(title + "-" * (_WIDTH - len(title)), _BOLD), *_beside(step.picture, facts), ""]
-        return [*lines, *self._fired(step), *self._others(step), *self._idle(step), ""]
+        if step.reward[0]:
+            facts.append(f"reward  {step.reward[0]:.3f}")
+        facts += ["", *present(cast_of(env.playing), after)]
+        title = f"-- step {self.t} "
+        lines = [
+            self._paint(title + "-" * (_WIDTH - len(title)), _BOLD),
+            *_beside(env.plain_text(), facts),
+            "",
+        ]
+        told = _StepFacts(after, explained["fired"], explained["others"])
+        return [*lines, *self._fired(told), *self._others(told), *self._idle(told), ""]
 
-    def end(self, trace: Trace) -> list[str]:
-        """How it ended, or that it has not."""
-        if trace.outcome is None:
-            return [f"not ended after {trace.length} steps, reward {trace.reward:.3f}"]
-        verdict = "success" if trace.success else "no success"
-        outcome = printable(trace.outcome)
-        return [f"{verdict} ({outcome}) after {trace.length} steps, reward {trace.reward:.3f}"]
-
-    def _fired(self, step: TraceStep) -> Iterator[str]:
+    def _fired(self, step: _StepFacts) -> Iterator[str]:
         for rule in step.fired:
-            if not self._names or is_among(rule["who"], self._names):
+            if not self._names or _is_among(rule["who"], self._names):
                 yield from self._rule("fired  ", rule, _GREEN)
 
-    def _others(self, step: TraceStep) -> Iterator[str]:
+    def _others(self, step: _StepFacts) -> Iterator[str]:
         for rule in step.others:
             if not self._is_asked_for(rule):
                 continue
@@ -84,10 +128,10 @@ class Text:
             yield from self._rule("not    ", rule, "")
             yield from _folded(f"-> {rule['why']}", " " * 9)
 
-    def _idle(self, step: TraceStep) -> Iterator[str]:
+    def _idle(self, step: _StepFacts) -> Iterator[str]:
         """Whoever was named and had no rule to be asked, as in a state without rules."""
         for name in self._names:
-            if not any(is_among(rule["who"], [name]) for rule in (*step.fired, *step.others)):
+            if not any(_is_among(rule["who"], [name]) for rule in (*step.fired, *step.others)):
                 known = found(step.state, name) or {}
                 state = f" in {known['state']}" if "state" in known else ""
                 yield printable(f"none   {name}{state}: no rule was asked")
@@ -95,7 +139,7 @@ class Text:
     def _is_asked_for(self, rule: dict[str, Any]) -> bool:
         """Without names: what those in the room did not do, as far as it was asked."""
         if self._names:
-            return is_among(rule["who"], self._names)
+            return _is_among(rule["who"], self._names)
         return rule["who"] not in ("agent", "outcome") and "part" in rule
 
     def _rule(self, mark: str, rule: dict[str, Any], style: str) -> Iterator[str]:
@@ -108,6 +152,11 @@ class Text:
 
     def _paint(self, text: str, style: str) -> str:
         return f"{style}{text}{_RESET}" if self._color and style else text
+
+
+def _is_among(who: str, names: Sequence[str]) -> bool:
+    """Whether a member is named, or its group is."""
+    return who in names or who.partition("[")[0] in names
 
 
 def _beside(picture: str, facts: list[str]) -> list[str]:

@@ -9,15 +9,17 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Clock
-from socialai_dsl.analysis.tally import Tally, TallyItem, parts_of, tally
+from socialai_dsl.analysis.tally import Tally, TallyItem, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
+from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
-from socialai_dsl.evaluation.scripts import script_of, with_script
 from trainer.config import UNTRAINED
 
 _TOGETHER: Final = 250
@@ -80,33 +82,45 @@ def _parts(scenario: str) -> list[TallyItem]:
 
 
 def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -> Tally:
-    played = scenarios_of(socialai_dsl.load(scenario))
+    """Let an agent play. What happens in episodes that the clock breaks off counts."""
     envs: Any = socialai_dsl.make_vec(
         scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled"
     )
     try:
-        if agent == "random":
-            generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
-            shape = (envs.num_envs, len(sizes))
-            return tally(
-                envs,
-                played,
-                lambda seen: generator.integers(0, sizes, shape),
-                lambda rows, numbers: None,
-                episodes,
-                seed,
-                clock,
-            )
         if agent not in UNTRAINED:
             require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
             warnings.warn(warning, stacklevel=2)
-        return tally(envs, played, policy.act, policy.reset, episodes, seed, clock)
+        counting = Counting(Watch(envs, scenarios_of(socialai_dsl.load(scenario))))
+
+        def over() -> bool:
+            clock.progress(f"{counting.ended} of {episodes} episodes played")
+            return clock.is_over
+
+        with clock.until_interrupted():
+            play(Rooms(envs, [counting]), {AGENT: policy}, SeededRooms(seed, episodes), over)
+        return counting.watch.tally(counting.ended)
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:
         envs.close()
+
+
+class Counting(Observer):
+    """Counts what comes about, and the episodes that are over."""
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch, self.ended = watch, 0
+
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """See `Observer.began`."""
+        self.watch.began(begun)
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self.watch.stepped(step.running)
+        self.ended += int(np.count_nonzero(step.ended))
 
 
 @dataclass

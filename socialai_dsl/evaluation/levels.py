@@ -14,9 +14,9 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.atomic import write_json
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.episodes.players import Player
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.players import Player
-from socialai_dsl.evaluation.testing import evaluate_agent
+from socialai_dsl.evaluation.test_set import evaluate
 
 
 def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
@@ -82,7 +82,7 @@ def _digest(scenario: str) -> str:
 
 
 def _played(scenario: str, agent: str, episodes: int) -> Level:
-    result = evaluate_agent(Player(agent), scenario, episodes).result
+    result = evaluate(Player(agent), scenario, episodes).result
     return Level(result.success_rate, result.success_rate_se, f"{episodes} test episodes")
 
 

@@ -5,7 +5,7 @@ import io
 from pathlib import Path
 
 from socialai_dsl.atomic import write_text
-from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.runs.folder import EPISODES, REPLAY, only_writer, scenario_folder_name
 
@@ -15,13 +15,11 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
 
     Raises:
         UsageError: another process writes there.
-        ValueError: it is none of `evaluate_agent`'s.
+        ValueError: it is none of `evaluate`'s.
         OSError: a file cannot be written.
     """
     if not isinstance(evaluation, Evaluation):
-        raise ValueError(
-            f"evaluation: got an {type(evaluation).__name__}, expected what `evaluate_agent` returns"
-        )
+        raise ValueError(f"evaluation: got an {type(evaluation).__name__}, expected what `evaluate` returns")
     with only_writer(folder):
         return write_recordings(evaluation, folder, count, label)
 

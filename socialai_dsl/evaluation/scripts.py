@@ -1,4 +1,4 @@
-"""Scripts: which one a scenario has for its agent, how many rooms it solves, and whether the others can be solved."""
+"""How many rooms a scenario's script solves, and whether the others can be solved."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,14 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.analysis.search import Finding, search_rooms
-from socialai_dsl.checking.loaded import Loaded, unscripted
-from socialai_dsl.errors import UsageError
-from socialai_dsl.frontend import Scripted, closest_script
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
+from socialai_dsl.episodes.policies import ScriptedPolicy
+from socialai_dsl.episodes.scripts import with_script
 
 _TOGETHER: Final = 250
 _ROOMS_SHOWN: Final = 12
@@ -24,34 +23,6 @@ VERDICTS: Final = {
     "undecided": "are undecided: too many states, or too little time",
 }
 """What may be found of a room that the script does not solve -> the same in words."""
-
-
-def script_of(scenario: str, loaded: Loaded | None = None) -> Scripted | None:
-    """The scenario itself if it scripts the agent, else its variant `oracle`; None if there is no script.
-
-    Args:
-        scenario: a path or a name.
-        loaded: the same, where it is loaded already.
-
-    Raises:
-        ScenarioError: the scenario, or its variant, has mistakes.
-    """
-    closest = closest_script(scenario, loaded)
-    return None if unscripted(closest.loaded) else closest
-
-
-def with_script(scenario: str, loaded: Loaded | None = None) -> Scripted:
-    """`script_of`, which there must be.
-
-    Raises:
-        UsageError: there is no script.
-    """
-    closest = closest_script(scenario, loaded)
-    if lacking := unscripted(closest.loaded):
-        raise UsageError(
-            f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
-        )
-    return closest
 
 
 @dataclass(frozen=True)
@@ -173,7 +144,7 @@ def play_script(
         UsageError: there is no script.
     """
     scripted, whole = with_script(scenario).name, Clock() if clock is None else clock
-    played = _Played(np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64), [""] * rooms)
+    played = _Played(rooms)
     findings: list[Finding] = []
     with whole.until_interrupted():
         _play(scripted, played, seed, whole.part(2))
@@ -205,14 +176,25 @@ def play_script(
     )
 
 
-@dataclass
-class _Played:
-    """How the script's episodes ended, of rooms 0 to `rooms` - 1: (planned,) each."""
+class _Played(Observer):
+    """How the script's episodes ended. Rooms count block by block, so that no length is favoured when time runs out."""
 
-    success: NDArray[np.bool_]
-    lengths: NDArray[np.int64]
-    outcomes: list[str]
-    rooms: int = 0
+    def __init__(self, rooms: int) -> None:
+        self.over, self.success = np.zeros(rooms, np.bool_), np.zeros(rooms, np.bool_)
+        self.lengths, self.outcomes = np.zeros(rooms, np.int64), [""] * rooms
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self.lengths[step.numbers[step.running]] += 1
+        for room in np.flatnonzero(step.ended).tolist():
+            number = int(step.numbers[room])
+            self.over[number], self.success[number] = True, step.success[room]
+            self.outcomes[number] = rooms.env.outcomes[step.outcome[room]]
+
+    @property
+    def rooms(self) -> int:
+        """How many count: the blocks from the first one on that are over."""
+        return len(self.over) if self.over.all() else int(self.over.argmin()) // _TOGETHER * _TOGETHER
 
     @property
     def failed(self) -> list[int]:
@@ -221,28 +203,18 @@ class _Played:
 
 
 def _play(scripted: str, played: _Played, seed: int, clock: Clock) -> None:
-    """Play one episode in each room. Rooms are played together and count together, so that no length is favoured."""
-    rooms = len(played.outcomes)
-    count = min(rooms, _TOGETHER)
-    envs: Any = socialai_dsl.make_vec(scripted, num_envs=count, copy=False, autoreset_mode="Disabled")
+    """Play one episode in each room."""
+    rooms = len(played.over)
+    envs: Any = socialai_dsl.make_vec(
+        scripted, num_envs=min(rooms, _TOGETHER), copy=False, autoreset_mode="Disabled"
+    )
+
+    def over() -> bool:
+        clock.progress(f"{scripted}: {int(played.over.sum())} of {rooms} rooms played")
+        return clock.is_over
+
     try:
-        for first in range(0, rooms, count):
-            clock.progress(f"{scripted}: {first} of {rooms} rooms played")
-            indices = np.arange(first, first + count)
-            running = indices < rooms
-            envs.reset(seed=seed, options={"index": indices, "reset_mask": running.copy()})
-            while running.any():
-                if clock.is_over:
-                    return
-                _, _, terminated, truncated, infos = envs.step(envs.scripted_actions())
-                played.lengths[indices[running]] += 1
-                now = running & (terminated | truncated)
-                if now.any():
-                    played.success[indices[now]] = infos["success"][now]
-                    for row in np.flatnonzero(now).tolist():
-                        played.outcomes[indices[row]] = envs.outcomes[infos["outcome"][row]]
-                    running &= ~now
-            played.rooms = min(first + count, rooms)
+        play(Rooms(envs, [played]), {AGENT: ScriptedPolicy(envs)}, SeededRooms(seed, rooms), over)
     finally:
         envs.close()
 

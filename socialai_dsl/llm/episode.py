@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
-from socialai_dsl.envs import make
+from socialai_dsl.envs import ScenarioEnv, make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.factory import Scenario
+from socialai_dsl.episodes.play import AGENT, Rooms
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import Style, TextView
@@ -89,7 +90,7 @@ class EpisodeResult:
 
 
 class Episode(Copied):
-    """One environment, played in text, episode after episode.
+    """The agent's seat of one room, played in text, episode after episode.
 
     Args:
         scenario: a path, a name or a program.
@@ -123,7 +124,8 @@ class Episode(Copied):
             raise ValueError(
                 f"on_invalid: got {on_invalid!r}, expected one of {', '.join(get_args(OnInvalid))}"
             )
-        self.env = make(scenario)
+        self._rooms = Rooms(make(scenario))
+        self.env: ScenarioEnv = self._rooms.env
         self.view = TextView(self.env.program, style)
         self.language = ActionLanguage(self.env.program)
         self.instructions = self.view.instructions(mode, goal)
@@ -148,12 +150,12 @@ class Episode(Copied):
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         options = None if test_episode is None else {"test_episode": test_episode}
-        observation, info = self.env.reset(seed=seed, options=options)
+        self._rooms.begin({"seed": seed, "options": options})
         self.actions, self._refused, self._result = [], 0, EpisodeResult()
         self.answered = []
         if self._asker is not None:
-            self._questions = self._asker.reset(seed, options, observation["image"])
-        self._text = self.view.observe(observation, info)
+            self._questions = self._asker.reset(seed, options, self._seen["image"])
+        self._text = self.view.observe(self._seen, self._rooms.info)
         return self._text
 
     def step(self, reply: Reply, stop: str = "") -> Turn:
@@ -239,18 +241,24 @@ class Episode(Copied):
 
     def _play(self, action: Action, error: str = "") -> Turn:
         encoded = self.env.encode_action(action)
-        observation, reward, terminated, truncated, info = self.env.step(encoded)
+        step = self._rooms.step({AGENT: encoded[None]})
         self.actions.append(encoded)
-        done = bool(terminated or truncated)
+        done, reward = bool(step.ended[0]), float(step.reward[0])
         if self._asker is not None:
-            self._questions = self._asker.step(encoded, observation["image"], done)
-        self._note(float(reward), played=True)
+            self._questions = self._asker.step(encoded, self._seen["image"], done)
+        self._note(reward, played=True)
         if done:
-            success = bool(info.get("success", False))
-            self._result = replace(self._result, ending=outcome_name(info), success=success)
-        self._text = self.view.observe(observation, info)
+            self._result = replace(
+                self._result, ending=outcome_name(step.info), success=bool(step.success[0])
+            )
+        self._text = self.view.observe(self._seen, step.info)
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
-        return Turn(told + self._text, float(reward), done, action, error)
+        return Turn(told + self._text, reward, done, action, error)
+
+    @property
+    def _seen(self) -> dict[str, NDArray[Any]]:
+        """The present observation."""
+        return {name: value[0] for name, value in self._rooms.observations[AGENT].items()}
 
     def _note(self, reward: float = 0.0, played: bool = False) -> None:
         """Count a reply, and the step that it played."""

@@ -1,5 +1,6 @@
 """A person's game: the episode so far, its dialogue, and every step back to its start."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,8 +10,11 @@ from numpy.typing import NDArray
 
 import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
+from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.typed import Phrases
 from socialai_dsl.envs.view import View
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
+from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 from socialai_dsl.render.panel import DialogueLine
@@ -42,7 +46,6 @@ class GameMoment:
     """A moment of an episode.
 
     Attributes:
-        snapshot: the environment's exact state.
         view: what the agent sees, uint8 (7, 7, C).
         member: of a suite, which scenario is played.
         action: what led here, int64 (heads,); None before the first step.
@@ -51,7 +54,6 @@ class GameMoment:
         ended: how the episode ended; None while it has not.
     """
 
-    snapshot: bytes
     view: NDArray[np.uint8]
     member: str | None
     action: NDArray[np.int64] | None = None
@@ -106,8 +108,8 @@ def finished_episodes(file: Path) -> list[FinishedEpisode]:
     return played
 
 
-class Game:
-    """One environment, and everything that happened in it since the reset.
+class Game(Observer):
+    """An episode with a person on the agent's seat, and everything that happened in it.
 
     Attributes:
         title: which episode is played.
@@ -123,7 +125,8 @@ class Game:
 
     def __init__(self, scenario: str) -> None:
         loaded = socialai_dsl.load(scenario)
-        self._env = socialai_dsl.make(scenario)
+        self._stage = Stage(socialai_dsl.make(scenario), [self])
+        self._env: ScenarioEnv = self._stage.env
         self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
         self._about = _abouts(loaded, self._program)
@@ -138,10 +141,9 @@ class Game:
         Raises:
             RoomError: no room that was drawn is as the scenario asks; the game stays where it was.
         """
-        observation, info = self._env.reset(**reset)
+        self._stage.begin(reset)
         self.title = title
-        self._moments = [GameMoment(self._env.snapshot(), observation["image"], info.get("member"))]
-        self._note("episode", title=title, reset=reset, member=info.get("member"))
+        self._note("episode", title=title, reset=reset, member=self.now.member)
 
     def act(self, movement: str | None, sentence: str | None) -> None:
         """Play a step.
@@ -150,34 +152,41 @@ class Game:
             ValueError: it cannot be done or said; the message says what was probably meant.
         """
         action = self._env.encode_action((movement, sentence))
-        before = self.now
-        observation, reward, terminated, truncated, info = self._env.step(action)
-        step = describe_step(self._program, action, len(self._moments), info["utterance"])
-        self._moments.append(
-            GameMoment(
-                self._env.snapshot(),
-                observation["image"],
-                info.get("member"),
-                action,
-                (*before.lines, *step.dialogue),
-                before.reward + float(reward),
-                self._ended(info) if terminated or truncated else None,
-            )
-        )
-        self._note(
-            "step", t=self.steps, action=action.tolist(), did=movement, said=sentence, reward=float(reward)
-        )
+        step = self._stage.step({AGENT: action[None]})
+        reward = float(step.reward[0])
+        self._note("step", t=self.steps, action=action.tolist(), did=movement, said=sentence, reward=reward)
         if (ended := self.now.ended) is not None:
             self._note("end", **vars(ended), steps=self.steps, reward=self.now.reward)
 
     def undo(self) -> bool:
         """Take the last step back, chance included; whether there was one."""
-        if not self.steps:
+        if not self._stage.back():
             return False
-        self._moments.pop()
-        self._env.restore(self.now.snapshot)
         self._note("undo", t=self.steps)
         return True
+
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """See `Observer.began`."""
+        self._moments = [GameMoment(rooms.observations[AGENT]["image"][0], rooms.info.get("member"))]
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        before, info, action = self.now, step.info, step.actions[AGENT][0]
+        words = describe_step(self._program, action, len(self._moments), info["utterance"])
+        self._moments.append(
+            GameMoment(
+                rooms.observations[AGENT]["image"][0],
+                info.get("member"),
+                action,
+                (*before.lines, *words.dialogue),
+                before.reward + float(step.reward[0]),
+                self._ended(info) if step.ended[0] else None,
+            )
+        )
+
+    def back(self, rooms: Rooms) -> None:
+        """See `Observer.back`."""
+        self._moments.pop()
 
     @property
     def now(self) -> GameMoment:
@@ -192,7 +201,7 @@ class Game:
     @property
     def steps(self) -> int:
         """How many steps were played."""
-        return len(self._moments) - 1
+        return self._stage.steps
 
     def room(self) -> str:
         """The room as text with escape codes for colours."""
@@ -241,7 +250,7 @@ class Game:
         if self.journal is not None:
             self.journal.note(event, **more)
 
-    def _ended(self, info: dict[str, Any]) -> EpisodeEnd:
+    def _ended(self, info: Mapping[str, Any]) -> EpisodeEnd:
         name = outcome_name(info)
         return EpisodeEnd(name, bool(info["success"]), self._endings[name].text)
 

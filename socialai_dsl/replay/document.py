@@ -208,6 +208,14 @@ class Trace(_Part):
         ended = self.moments[-1].ended
         return ended is not None and ended.success
 
+    def fired(self, moment: Moment) -> list[Rule]:
+        """The rules that fired in the step before a moment."""
+        return [self.rules[number] for number in moment.fired]
+
+    def reasons(self, moment: Moment) -> list[tuple[Rule, str]]:
+        """The rules that were asked in the step before a moment and did not fire, each with the reason."""
+        return [(self.rules[number], self.texts[why]) for number, why in moment.others]
+
     def portable(self) -> Trace:
         """The same without the folders of this machine: files are called as `short_file` calls them."""
         rules = [rule.model_copy(update={"at": _short_place(rule.at)}) for rule in self.rules]

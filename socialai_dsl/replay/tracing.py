@@ -1,10 +1,9 @@
-"""Makes the trace of a played episode."""
+"""Traces an episode while it is played."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, repeat
 from typing import Any, Final
 
 import numpy as np
@@ -24,61 +23,8 @@ from socialai_dsl.vocabulary import NOUN
 Action = NDArray[np.int64]
 Answers = Sequence[tuple[str, str]]
 """What a language model answered, each with what was wrong with it."""
-Think = Callable[[Mapping[str, NDArray[Any]]], Thought | None]
-"""What an agent makes of an observation; asked in each moment before a step, in order."""
 _SHOWN: Final = 400
 """The most characters of an answer that are shown; a model's last words hold its action."""
-
-
-def trace_of(
-    env: Any,
-    actions: Iterable[Action],
-    reset: Mapping[str, Any],
-    *,
-    scenario: str,
-    agent: str,
-    episode: str,
-    endings: Mapping[str, str] | None = None,
-    about: str = "",
-    think: Think | None = None,
-    replies: Sequence[Answers] = (),
-    cut_short: Outcome | None = None,
-) -> Trace:
-    """Play an episode with given actions, and trace it.
-
-    Episodes replay exactly, so a seed or a test episode and the actions are a complete record of one.
-
-    Args:
-        env: of the scenario, as `socialai_dsl.make` returns it.
-        actions: int64 (heads,) each; those after the end of the episode are ignored.
-        reset: arguments of `env.reset`, such as `{"seed": 7}`.
-        scenario: its name, for people.
-        agent: the player, for people.
-        episode: which episode it is, for people.
-        endings: the text to show for each outcome; by default its name.
-        about: a sentence about the scenario.
-        think: returns the `Thought` of a trained agent about an observation; called in each moment before a step, in
-            order.
-        replies: of a language model, for each action the pairs of reply and error before it, and perhaps one more entry
-            after the last action.
-        cut_short: the outcome of an episode that no step ended.
-
-    Raises:
-        ValueError: there is no such episode, or an action is outside the space.
-    """
-    observation, info = env.reset(**reset)
-    tracer = Tracer(env, scenario, agent, endings or {}, about)
-    tracer.begin(episode, observation, info)
-    answers = chain(replies, repeat(()))
-    for action, said in zip(actions, answers, strict=False):
-        thought = think(observation) if think is not None else None
-        observation, *result = env.step(action)
-        if tracer.step(action, observation, *result, thought=thought, replies=said).ended is not None:
-            break
-    else:
-        if cut_short is not None:
-            tracer.cut_short(next(answers), cut_short)
-    return tracer.trace().portable()
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
+from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.scripts import script_of
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name

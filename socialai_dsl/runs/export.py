@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.episodes.players import folder_of, require_trainer
 from socialai_dsl.errors import OptionError, UsageError
-from socialai_dsl.evaluation.players import folder_of, require_trainer
 from socialai_dsl.frontend import load
 from socialai_dsl.runs.copies import MovedScenario
 from socialai_dsl.runs.folder import (

@@ -75,7 +75,7 @@ class Run:
 
     @property
     def agent(self) -> str:
-        """Its agent, as `evaluate_agent` takes it: the run's folder if it was trained."""
+        """Its agent, as `evaluate` takes it: the run's folder if it was trained."""
         config = self.config
         return str(self.folder) if config.trains else config.agent
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.loaded import Loaded, about_of
-from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.runs.folder import (
     CARD,

@@ -15,10 +15,10 @@ from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled, make_vec
+from socialai_dsl.episodes.players import Player, folder_of, named_agent, require_trainer
+from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, RunFailed, UsageError
-from socialai_dsl.evaluation.players import Player, folder_of, named_agent, require_trainer
-from socialai_dsl.evaluation.scripts import script_of, with_script
-from socialai_dsl.evaluation.testing import play_test_set
+from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import endings_of, short_name

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +16,10 @@ from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.episodes.play import AGENT
+from socialai_dsl.episodes.policies import Policy, RandomPolicy
+from socialai_dsl.episodes.stage import Stage
+from socialai_dsl.episodes.traces import Tracing, thought_of
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.reader import display_name
@@ -24,7 +27,6 @@ from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
-from socialai_dsl.studio.files import PLAYERS
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
@@ -39,28 +41,16 @@ class RefusalError(ValueError):
     """Something cannot be done; the message is for the person at the screen."""
 
 
-@dataclass
-class _Before:
-    """What is put back with a step: the environment, and the player's chance."""
-
-    snapshot: bytes
-    observation: Mapping[str, NDArray[Any]]
-    chance: Mapping[str, Any]
-    ended: bool
-
-
 class Session:
     """The content of a window. Each method that a window may call returns its next content."""
 
     def __init__(self) -> None:
         self._path = Path()
         self._texts: dict[Path, Source] = {}
-        self._game: tuple[ScenarioEnv, Tracer] | None = None
+        self._game: tuple[Stage, Tracing] | None = None
         self._phrases = Phrases((), Sentences((), (), ()))
-        self._moments: list[_Before] = []
         self._player, self._seed = "me", 0
-        self._policy: Any = None
-        self._chance = np.random.default_rng(0)
+        self._policy: Policy = RandomPolicy(())
         self._prepared = False
 
     def draw(self, path: str, text: str, seed: int = 0) -> Reply:
@@ -92,35 +82,33 @@ class Session:
             raise RefusalError("there is no scenario yet")
         if player != self._player:
             self._choose(player)
-        env, tracer = self._playing()
+        stage, tracing = self._playing()
+        tracing.title = f"seed {seed}" if layout is None else "a layout"
         try:
-            observation, info = env.reset(seed=seed, options=None if layout is None else {"layout": layout})
+            stage.begin({"seed": seed, "options": None if layout is None else {"layout": layout}})
         except (ValueError, RoomError) as error:
             raise RefusalError(str(error)) from None
-        self._seed, self._chance = seed, np.random.default_rng(seed)
-        if self._policy is not None:
-            self._policy.reset(np.ones(1, np.bool_))
-        tracer.begin(f"seed {seed}" if layout is None else "a layout", observation, info)
-        self._moments = [_Before(env.snapshot(), observation, self._chance.bit_generator.state, False)]
+        self._seed = seed
+        self._begin_anew()
         return {
-            "trace": tracer.trace().model_dump(mode="json", exclude_defaults=True)
+            "trace": tracing.tracer.trace().model_dump(mode="json", exclude_defaults=True)
             | {"format": "socialai-trace/1"},
             "phrases": {"sentences": self._phrases.sentences()[:2000]},
-            "rules": list(env.counters()["rules"]),
+            "rules": list(stage.env.counters()["rules"]),
             "player": self._player,
             "seed": seed,
         }
 
     def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
         """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
-        env, _ = self._playing()
+        stage, _ = self._playing()
         if line is not None:
             movement, sentence = split_line(line.strip(), self._phrases.actions)
         try:
-            action = env.encode_action((movement, sentence))
+            action = stage.env.encode_action((movement, sentence))
         except ValueError:
             raise RefusalError(self._phrases.problem(line if line is not None else sentence or "")) from None
-        return self._step(action, None)
+        return self._step(action[None], None)
 
     def prepare(self) -> None:
         """Take a step and take it back, if none was taken yet: the first one prepares all explanations.
@@ -128,51 +116,40 @@ class Session:
         Raises:
             RefusalError: there is no room yet.
         """
-        env, _ = self._playing()
-        if not self._prepared and len(self._moments) == 1:
+        stage, _ = self._playing()
+        if not self._prepared and stage.running.all() and stage.steps == 0:
             self._prepared = True
-            env.step(env.encode_action((None, None)))
-            env.explain()
-            env.restore(self._moments[0].snapshot)
+            stage.env.step(stage.env.encode_action((None, None)))  # past the stage: nobody is to see it
+            stage.env.explain()
+            stage.env.restore(stage.moments[0].snapshot)
 
     def auto(self) -> Reply:
         """Let the chosen player play a step."""
-        env, _ = self._playing()
-        if not self._moments or self._moments[-1].ended:
+        stage, _ = self._playing()
+        if not stage.running.all():
             raise RefusalError(_ENDED)
-        if self._player == "script":
-            return self._step(env.scripted_action(), None)
-        sizes = env.action_space.nvec  # type: ignore[attr-defined]
-        if self._policy is None:
-            return self._step(self._chance.integers(0, sizes, dtype=np.int64), None)
-        probabilities, value = self._policy.think(self._moments[-1].observation)
-        shares = [np.asarray(head) / sum(head) for head in probabilities]
-        action = np.array([self._chance.choice(len(head), p=head) for head in shares])
-        rounded = [[round(share, 4) for share in head] for head in probabilities]
-        return self._step(action, Thought(probabilities=rounded, value=round(value, 4)))
+        action = self._policy.act(stage.observations[AGENT])
+        assert not isinstance(action, Awaitable), "internal: nobody answers later here"
+        return self._step(action, thought_of(self._policy))
 
     def back(self, to: int) -> Reply:
         """Take steps back until `to` of them are left, chance included."""
-        env, tracer = self._playing()
-        if not 0 <= to < len(self._moments):
-            raise RefusalError(f"there are {len(self._moments) - 1} steps to take back")
-        while len(self._moments) > to + 1:
-            self._moments.pop()
-            tracer.back()
-        now = self._moments[-1]
-        env.restore(now.snapshot)
-        self._chance.bit_generator.state = dict(now.chance)
-        if self._policy is not None:  # it remembers what it has seen
-            self._policy.reset(np.ones(1, np.bool_))
-            for before in self._moments[:-1]:
-                self._policy.think(before.observation)
+        stage, _ = self._playing()
+        if not 0 <= to <= stage.steps:
+            raise RefusalError(f"there are {stage.steps} steps to take back")
+        while stage.steps > to:
+            stage.back()
+        self._begin_anew()
+        for moment in stage.moments[:-1]:  # it remembers what it has seen, and what it has drawn
+            self._policy.act(moment.observations[AGENT])
         return {"length": to}
 
     def place(self, who: str, at: tuple[int, int]) -> Reply:
         """Begin again in the same room with one thing somewhere else; the layout is told, too."""
-        env, _ = self._playing()
+        stage, _ = self._playing()
+        env: ScenarioEnv = stage.env
         described = env.describe()
-        if len(self._moments) != 1:
+        if stage.steps:
             raise RefusalError("things are moved before the first step; begin the episode again first")
         key, _, index = who.rstrip("]").partition("[")
         found = described.get(key)
@@ -194,8 +171,8 @@ class Session:
 
     def layout(self) -> Reply:
         """The room as it is now, as a layout that the commands take."""
-        env, _ = self._playing()
-        return {"layout": env.describe()}
+        stage, _ = self._playing()
+        return {"layout": stage.env.describe()}
 
     def write_layout(self, text: str) -> Reply:
         """The text of the file, with the room as it is now as the start of every episode.
@@ -203,8 +180,8 @@ class Session:
         Of a suite, the member that is played gets a `layout`. Of a scenario the reply has `suite`, the text of a new
         suite that begins so, and the `name` of its file.
         """
-        env, _ = self._playing()
-        described = env.describe()
+        stage, _ = self._playing()
+        described = stage.env.describe()
         layout, stem = start_layout(described), self._path.stem
         loaded = load(str(self._path), {self._path: Source(display_name(self._path), text)})
         if not isinstance(loaded, LoadedSuite):
@@ -220,8 +197,8 @@ class Session:
 
     def replay(self) -> Reply:
         """The episode so far as a page of its own."""
-        _, tracer = self._playing()
-        return {"page": replay_page([tracer.trace().portable()])}
+        _, tracing = self._playing()
+        return {"page": replay_page([tracing.tracer.trace().portable()])}
 
     def check(self, path: str, text: str) -> Reply:
         """What `socialai check` says of a text."""
@@ -245,9 +222,13 @@ class Session:
         env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
         self._phrases = Phrases(program.actions, program.sentences)
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
-        self._game = env, Tracer(env, loaded.name, "me", endings, about_of(loaded))
-        self._player, self._policy, self._moments = "me", None, []
-        self._prepared = False
+        tracing = Tracing(Tracer(env, loaded.name, "me", endings, about_of(loaded)))
+        self._game = Stage(env, [tracing]), tracing
+        self._player, self._policy, self._prepared = "me", RandomPolicy(self._game[0].action_sizes), False
+
+    def _begin_anew(self) -> None:
+        """Let the player forget everything."""
+        self._policy.reset(np.ones(1, np.bool_), np.array([self._seed]))
 
     def _choose(self, player: str) -> None:
         """Change the player."""
@@ -263,32 +244,27 @@ class Session:
             if unscripted(loaded):
                 raise RefusalError("the variant `oracle` gives the agent no frame")
         self._use(loaded)
-        env, tracer = self._playing()
-        if player not in PLAYERS:
-            self._policy = _policy(player, env)
-        self._player = tracer.agent = player
+        stage, tracing = self._playing()
+        if player != "me":
+            self._policy = _policy("oracle" if player == "script" else player, stage.env)
+        self._player = tracing.tracer.agent = player
 
-    def _playing(self) -> tuple[ScenarioEnv, Tracer]:
+    def _playing(self) -> tuple[Stage, Tracing]:
         if self._game is None:
             raise RefusalError("there is no room yet; the scenario has mistakes")
         return self._game
 
     def _step(self, action: NDArray[np.int64], thought: Thought | None) -> Reply:
-        env, tracer = self._playing()
-        if not self._moments or self._moments[-1].ended:
+        stage, tracing = self._playing()
+        if not stage.running.all():
             raise RefusalError(_ENDED)
-        before = tracer.counts()
+        before, tracing.thought = tracing.tracer.counts(), thought
         try:
-            observation, reward, terminated, truncated, info = env.step(action)
+            stage.step({AGENT: action})
         except (ValueError, RoomError) as error:
-            env.restore(self._moments[-1].snapshot)
             who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
-        tracer.step(action, observation, reward, terminated, truncated, info, thought=thought)
-        self._moments.append(
-            _Before(env.snapshot(), observation, self._chance.bit_generator.state, terminated or truncated)
-        )
-        return {"more": tracer.trace(before).model_dump(mode="json", exclude_defaults=True)}
+        return {"more": tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)}
 
 
 ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
@@ -306,13 +282,15 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
 """What a window may ask a session for, by name."""
 
 
-def _policy(run: str, env: Any) -> Any:
+def _policy(run: str, env: Any) -> Policy:
+    from socialai_dsl.episodes.players import Player, make_policy, require_trainer
     from socialai_dsl.errors import UsageError
-    from socialai_dsl.evaluation.players import Player, make_policy, require_trainer
 
     try:
-        require_trainer()
-        return make_policy(Player(run), env)[0]
+        player = Player(run)
+        if player.is_trained:
+            require_trainer()
+        return make_policy(player, env)[0]
     except (UsageError, ValueError, OSError) as error:
         raise RefusalError(f"{run}: {error}") from None
 

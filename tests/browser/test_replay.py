@@ -9,7 +9,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main
-from socialai_dsl.replay import trace_of
+from socialai_dsl.episodes import trace_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

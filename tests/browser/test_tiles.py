@@ -11,13 +11,13 @@ import pytest
 from PIL import Image
 
 import socialai_dsl as sd
+from socialai_dsl.episodes import trace_of
 from socialai_dsl.library import prelude
 from socialai_dsl.program import LAST_ACTS
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import SIZES, Mark
 from socialai_dsl.render.tiles import draw_tile
-from socialai_dsl.replay import trace_of
 from socialai_dsl.replay.scripts import bundled
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
-from socialai_dsl.evaluation.scripts import script_of
+from socialai_dsl.episodes.scripts import script_of
 from tests.quick import one_in
 from tests.scenarios.playing import NOVEL
 

@@ -13,7 +13,7 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.evaluation import evaluate
+from socialai_dsl.evaluation import evaluate_policy
 from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
@@ -46,7 +46,7 @@ def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, sma
             train(config, EchoEnvs(8, chatter=0.3), tmp_path / "there", stop)
         path = train(config, EchoEnvs(8, chatter=0.3), tmp_path / "there", resume=True)
         envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
-        evaluate(CheckpointPolicy.load(path, envs, device="cuda"), envs, 8)
+        evaluate_policy(CheckpointPolicy.load(path, envs, device="cuda"), envs, 8)
     assert card.moved["there"] > 0
     there = read(path)
     for name, value in here.tensors.items():
@@ -80,5 +80,5 @@ def test_a_real_card_learns_what_the_cpu_does(net: str, tmp_path: Path, small_co
         first = json.loads((tmp_path / device / "metrics.jsonl").read_text().splitlines()[0])
         figures[device] = {name: first[name] for name in ("loss", "value_loss", "entropy", "imitation_loss")}
         envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
-        assert evaluate(CheckpointPolicy.load(path, envs, device=device), envs, 8).episodes == 8
+        assert evaluate_policy(CheckpointPolicy.load(path, envs, device=device), envs, 8).episodes == 8
     assert figures["cuda"] == pytest.approx(figures["cpu"], rel=1e-3, abs=1e-4)

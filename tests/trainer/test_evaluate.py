@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.evaluation import EvalResult, RandomPolicy, ScriptedPolicy, evaluate, wilson_interval
+from socialai_dsl.episodes import EvalResult, RandomPolicy, ScriptedPolicy, wilson_interval
+from socialai_dsl.evaluation import evaluate_policy
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.checkpoint import write
 from trainer.play import CheckpointPolicy
@@ -33,7 +34,7 @@ class Log(EchoEnvs):
 
 def test_the_script_solves_every_test_episode() -> None:
     envs = EchoEnvs(16, mode=DISABLED)
-    result = evaluate(ScriptedPolicy(envs), envs, 40)
+    result = evaluate_policy(ScriptedPolicy(envs), envs, 40)
     assert (result.episodes, result.success_rate, result.success_rate_se) == (40, 1.0, 0.0)
     assert result.success_interval[1] == 1.0
     assert result.mean_length == 3
@@ -44,7 +45,7 @@ def test_the_script_solves_every_test_episode() -> None:
 
 def test_each_episode_is_played_once() -> None:
     envs = Log(16)
-    result = evaluate(RandomPolicy(SIZES), envs, 40)
+    result = evaluate_policy(RandomPolicy(SIZES), envs, 40)
     assert sorted(envs.begun) == list(range(40))
     assert envs.counters()["episodes"] == 40, "nothing else is played"
     assert len(result.success) == len(result.lengths) == len(result.returns) == 40
@@ -70,15 +71,15 @@ def test_a_result_does_not_depend_on_how_many_are_played_together(
     def play(together: int) -> EvalResult:
         envs = EchoEnvs(together, mode=DISABLED, chatter=0.3)
         if kind == "random":
-            return evaluate(RandomPolicy(SIZES, seed=5), envs, 40)
+            return evaluate_policy(RandomPolicy(SIZES, seed=5), envs, 40)
         if kind == "script":
-            return evaluate(ScriptedPolicy(envs), envs, 40)
+            return evaluate_policy(ScriptedPolicy(envs), envs, 40)
         path = checkpoint
         if kind == "normalised":
             config = small_config(net="paper-reference")
             path = write(tmp_path / "normalised", Session.start(config, EchoEnvs(8)).checkpoint())
         policy = CheckpointPolicy.load(path, envs, greedy=kind == "greedy", seed=5)
-        return evaluate(policy, envs, 40)
+        return evaluate_policy(policy, envs, 40)
 
     results = [play(together) for together in (1, 7, 40)]
     assert equal(results[0], results[1])
@@ -87,7 +88,7 @@ def test_a_result_does_not_depend_on_how_many_are_played_together(
 
 def test_another_seed_samples_other_actions() -> None:
     def play(seed: int) -> EvalResult:
-        return evaluate(RandomPolicy(SIZES, seed), EchoEnvs(8, mode=DISABLED), 40)
+        return evaluate_policy(RandomPolicy(SIZES, seed), EchoEnvs(8, mode=DISABLED), 40)
 
     assert equal(play(1), play(1))
     assert not equal(play(1), play(2))
@@ -103,7 +104,7 @@ def test_another_seed_samples_other_actions() -> None:
 )
 def test_what_cannot_be_evaluated_is_refused(envs: EchoEnvs, episodes: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        evaluate(RandomPolicy(SIZES), envs, episodes)
+        evaluate_policy(RandomPolicy(SIZES), envs, episodes)
 
 
 @pytest.mark.parametrize(
@@ -211,5 +212,5 @@ def test_playing_leaves_the_statistics_of_normalisation_alone(tmp_path: Path, sm
     policy = CheckpointPolicy.load(path, envs)
     before = {name: value.clone() for name, value in policy.net.state_dict().items()}
     assert any("running_mean" in name for name in before)
-    evaluate(policy, envs, 16)
+    evaluate_policy(policy, envs, 16)
     assert all((value == before[name]).all() for name, value in policy.net.state_dict().items())

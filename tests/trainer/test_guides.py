@@ -12,7 +12,7 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.evaluation import evaluate
+from socialai_dsl.evaluation import evaluate_policy
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.actions import log_probs_and_entropies
 from trainer.checkpoint import read
@@ -278,7 +278,7 @@ def test_imitation_alone_teaches_what_the_script_does(tmp_path: Path) -> None:
             raise AssertionError("nobody may be asked what to do while the agent is evaluated")
 
     there = Scriptless(64, mode=AutoresetMode.DISABLED)
-    result = evaluate(CheckpointPolicy.load(path, there, seed=1), there, 200)
+    result = evaluate_policy(CheckpointPolicy.load(path, there, seed=1), there, 200)
     assert result.success_rate > 0.9
 
 

@@ -19,7 +19,7 @@ import torch
 from gymnasium.vector import AutoresetMode
 
 import socialai_dsl
-from socialai_dsl.evaluation import evaluate
+from socialai_dsl.evaluation import evaluate_policy
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import ppo as training
 from trainer.checkpoint import read
@@ -57,7 +57,7 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     envs = EchoEnvs(128)
     path = train(config, envs, tmp_path)
     there = EchoEnvs(128, mode=AutoresetMode.DISABLED)
-    result = evaluate(CheckpointPolicy.load(path, there, seed=1), there, 300)
+    result = evaluate_policy(CheckpointPolicy.load(path, there, seed=1), there, 300)
     assert result.success_rate > 0.9, f"only {result.success_rate:.0%} of the episodes succeeded"
     first, last = rows(tmp_path)[0], rows(tmp_path)[-1]
     assert first["success"] < 0.3, "the task must not be easy by chance"

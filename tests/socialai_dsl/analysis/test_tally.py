@@ -12,10 +12,11 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.analysis.coverage import coverage
-from socialai_dsl.analysis.effort import Clock, Effort
-from socialai_dsl.analysis.tally import Tally, parts_of, tally
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.tally import Tally, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
-from socialai_dsl.envs import ScenarioVectorEnv
+from socialai_dsl.episodes import AGENT, FunctionPolicy, Rooms, ScriptedPolicy, SeededRooms, play
+from socialai_dsl.evaluation.coverage_report import Counting
 from tests.tiny import Folder
 
 ROOT = Path(__file__).parents[3]
@@ -27,22 +28,40 @@ def choose(row: int, step: int, sizes: Any) -> Any:
     return np.random.default_rng([row, step]).integers(0, sizes)
 
 
+class Chosen:
+    """Plays what `choose` says of each episode."""
+
+    def __init__(self, sizes: Any) -> None:
+        self._sizes = sizes
+
+    def reset(self, mask: Any, episodes: Any = None) -> None:
+        self._episodes = episodes
+        self._steps = np.where(mask, 0, getattr(self, "_steps", 0))
+
+    def act(self, observation: Any) -> Any:
+        self._steps += 1
+        pairs = zip(self._episodes.tolist(), self._steps.tolist(), strict=True)
+        return np.stack([choose(number, step, self._sizes) for number, step in pairs])
+
+
+def counted(envs: Any, name: str, policy: Any, episodes: int, seed: int) -> Tally:
+    counting = Counting(Watch(envs, scenarios_of(sd.load(name))))
+    play(Rooms(envs, [counting]), {AGENT: policy}, SeededRooms(seed, episodes))
+    return counting.watch.tally(counting.ended)
+
+
+def standing_still(path: Path) -> Tally:
+    """Four episodes, two at once, in which the agent does nothing."""
+    envs: Any = sd.make_vec(str(path), num_envs=2, autoreset_mode="Disabled")
+    still = [int(envs.single_action_space.nvec[0]) - 1, 0, 0, 0]
+    return counted(envs, str(path), FunctionPolicy(lambda seen: np.tile(still, (2, 1))), 4, seed=0)
+
+
 def played(name: str, together: int, scripted: bool) -> Tally:
     """Episodes 0 to 6, so many at once."""
-    envs = sd.make_vec(name, num_envs=together, autoreset_mode="Disabled")
-    assert isinstance(envs, ScenarioVectorEnv)
-    sizes, step, first = envs.single_action_space.nvec, [0], [-together]
-
-    def begin(rows: Any, numbers: Any) -> None:
-        step[0], first[0] = 0, first[0] + together
-
-    def act(observation: Any) -> Any:
-        step[0] += 1
-        if scripted:
-            return envs.scripted_actions()
-        return np.stack([choose(first[0] + row, step[0], sizes) for row in range(together)])
-
-    return tally(envs, scenarios_of(sd.load(name)), act, begin, EPISODES, seed=3, clock=Clock())
+    envs: Any = sd.make_vec(name, num_envs=together, autoreset_mode="Disabled")
+    policy = ScriptedPolicy(envs) if scripted else Chosen(envs.single_action_space.nvec)
+    return counted(envs, name, policy, EPISODES, seed=3)
 
 
 @cache
@@ -81,15 +100,15 @@ def explained(name: str, scripted: bool) -> tuple[Counter[tuple[str, str]], Coun
 @pytest.mark.parametrize("together", [1, 3, 7])
 @pytest.mark.thorough("plays every scenario step by step")
 def test_it_counts_what_happened(name: str, scripted: bool, together: int) -> None:
-    counted = played(name, together, scripted)
+    found = played(name, together, scripted)
     fired, endings = explained(name, scripted)
     rules: Counter[tuple[str, str]] = Counter()
-    for part, times in counted.times.items():
+    for part, times in found.times.items():
         if part.kind in ("rule", "outcome") and times:
             rules[part.kind, f"{part.span.file}:{part.span.line}"] += times
     assert rules == Counter({key: times for key, times in fired.items() if key[0] != "step"})
-    assert counted.endings == endings
-    assert counted.episodes == EPISODES
+    assert found.endings == endings
+    assert found.episodes == EPISODES
 
 
 def test_states_and_steps_are_counted_when_they_are_entered(tmp_path: Path) -> None:
@@ -115,23 +134,12 @@ def test_states_and_steps_are_counted_when_they_are_entered(tmp_path: Path) -> N
           agent: {at: [1, 1]}
         """,
     )
-    envs = sd.make_vec(str(path), num_envs=2, autoreset_mode="Disabled")
-    assert isinstance(envs, ScenarioVectorEnv)
-    still = np.tile([envs.single_action_space.nvec[0] - 1, 0, 0, 0], (2, 1))
-    counted = tally(
-        envs,
-        scenarios_of(sd.load(str(path))),
-        lambda seen: still,
-        lambda rows, numbers: None,
-        episodes=4,
-        seed=0,
-        clock=Clock(),
-    )
-    times = {part.name: number for part, number in counted.times.items()}
+    found = standing_still(path)
+    times = {part.name: number for part, number in found.times.items()}
     # Two members in four episodes: at the start, and back from c twice.
     assert (times["hop.a"], times["hop.b"], times["hop.c"], times["hop.d"]) == (24, 16, 16, 0)
     assert (times["walk.steps[0]"], times["walk.steps[1]"], times["walk.steps[2]"]) == (4, 4, 0)
-    assert counted.endings == {"timeout": 4}
+    assert found.endings == {"timeout": 4}
 
 
 def test_parts_are_named_where_they_are_written() -> None:
@@ -162,8 +170,8 @@ def test_entries_that_begin_and_end_in_one_turn_have_come_about(tmp_path: Path) 
           agent: {}
         """,
     )
-    counted = played(str(file), EPISODES, False)
-    steps = {part.name: times for part, times in counted.times.items() if part.kind == "step"}
+    found = played(str(file), EPISODES, False)
+    steps = {part.name: times for part, times in found.times.items() if part.kind == "step"}
     assert steps == {f"work.steps[{k}]": EPISODES for k in range(7)}
     loaded = sd.load(file)
     assert isinstance(loaded, sd.LoadedScenario)

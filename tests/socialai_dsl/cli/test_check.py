@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.analysis.search import Search
-from socialai_dsl.analysis.tally import _Watch
+from socialai_dsl.analysis.tally import Watch
 from socialai_dsl.cli.main import main
 
 Capture = pytest.CaptureFixture[str]
@@ -284,15 +284,15 @@ def test_an_interrupted_part_tells_what_is_known(capsys: Capture, monkeypatch: p
 
 
 def test_an_interrupted_game_counts_what_was_played(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    watched, calls = _Watch.after, []
+    watched, calls = Watch.stepped, []
 
-    def interrupting(self: _Watch, *arguments: Any) -> None:
+    def interrupting(self: Watch, *arguments: Any) -> None:
         calls.append(self)
         if len(calls) == 3:
             raise KeyboardInterrupt
         watched(self, *arguments)
 
-    monkeypatch.setattr(_Watch, "after", interrupting)
+    monkeypatch.setattr(Watch, "stepped", interrupting)
     assert main(two_parts("--episodes", "20", "--json")) == 130
     (found,) = json.loads(capsys.readouterr().out)
     assert found["interrupted"]

@@ -13,7 +13,8 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.replay import Trace, trace_of
+from socialai_dsl.episodes import trace_of
+from socialai_dsl.replay import Trace
 from socialai_dsl.replay.page import replay_page
 
 Capture = pytest.CaptureFixture[str]

@@ -16,6 +16,7 @@ import socialai_dsl as sd
 from socialai_dsl.cli.trace_text import present
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.picture import frame
+from socialai_dsl.episodes.film import record
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.play.game import Game
@@ -24,7 +25,6 @@ from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.grid import draw_grid, figures
 from socialai_dsl.render.tiles import draw_tile
-from socialai_dsl.replay.film import record
 from socialai_dsl.replay.state import cast_of
 from tests.quick import one_in
 

@@ -2,10 +2,21 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from socialai_dsl.evaluation.chance import _Tally, play_at_random
+from socialai_dsl.evaluation.chance import play_at_random
+
+KINDS = """
+scenario: kinds
+horizon: 20
+grammar: {templates: [Say <noun>], nouns: [it, that]}
+room: {size: 5}
+actions: [left]
+objects: {}
+let: {side: pick(left | right)}
+cast: {agent: {place: anywhere}}
+outcome: [{success: side == left}]
+"""
 
 WAITING = """
 scenario: waiting
@@ -21,21 +32,14 @@ outcome:
 """
 
 
-def test_long_episodes_count_as_often_as_short_ones() -> None:
-    """One environment ends its episodes at every step, the other at every tenth: three of each count."""
-    tally = _Tally(2, 3)
-    step = 0
-    while not tally.complete:
-        step += 1
-        ended = np.array([True, step % 10 == 0])
-        tally.note(np.array([1.0, 0.5]), ended, np.array([False, True]) & ended)
-    sample = tally.sample()
-    assert step == 30
-    assert sample.episodes == 6
-    assert sample.mean_length == 5.5
-    assert sample.sd_length == pytest.approx(np.std([1, 1, 1, 10, 10, 10], ddof=1))
-    assert sample.successes == 3
-    assert sample.mean_reward == pytest.approx((3 * 1.0 + 3 * 5.0) / 6)
+def test_long_episodes_count_as_often_as_short_ones(tmp_path: Path) -> None:
+    """An episode ends at once in one of two kinds of rooms, and lasts 20 steps in the other: each is half of all."""
+    file = tmp_path / "kinds.yaml"
+    file.write_text(KINDS)
+    sample = play_at_random(str(file), 5_000, seed=1)
+    assert sample.episodes == 5_000
+    assert sample.success_rate == pytest.approx(1 / 2, abs=5 * (1 / 4 / 5_000) ** 0.5)
+    assert sample.mean_length == pytest.approx((1 + 20) / 2, abs=5 * sample.sd_length / sample.episodes**0.5)
 
 
 def test_the_uniform_policy(tmp_path: Path) -> None:

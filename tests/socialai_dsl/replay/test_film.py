@@ -6,12 +6,13 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from gymnasium.spaces import MultiDiscrete
 from PIL import Image
 
+from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.program import Program
-from socialai_dsl.render.panel import DialogueLine
+from socialai_dsl.render.panel import DialogueLine, Face
 from socialai_dsl.replay.endings import Ending
-from socialai_dsl.replay.film import RecordedEpisode, record
 from socialai_dsl.replay.steps import Step, describe_step
 from socialai_dsl.vocabulary import Sentences, Slot
 
@@ -23,6 +24,7 @@ class Words:
     """The part of a program that the recording reads."""
 
     actions: tuple[str, ...] = ("left", "right", "forward")
+    outcomes: tuple[str, ...] = ("success@7", "one: success@7")
     sentences: Sentences = SENTENCES
 
 
@@ -32,8 +34,17 @@ PROGRAM = cast(Program, Words())
 class Stand:
     """An environment of three steps that says what it was told to."""
 
+    program, action_space = PROGRAM, MultiDiscrete([4, 2, 2, 2])
+
     def __init__(self, heard: list[str], **more: str) -> None:
         self._heard, self._more = heard, more
+
+    @property
+    def unwrapped(self) -> "Stand":
+        return self
+
+    def cast(self) -> list[Face]:
+        return []
 
     def reset(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         self.t, self.options = 0, options
@@ -56,7 +67,7 @@ HEARD = ["Ann: I am fine.\nBob: Me \x1b[31mtoo", "NA", "nobody"]
 
 
 def recorded() -> RecordedEpisode:
-    return record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {"options": {"test_episode": 4}})
+    return film(Stand(HEARD), ACTIONS, {"options": {"test_episode": 4}}, "an episode")
 
 
 @pytest.mark.parametrize(
@@ -111,7 +122,7 @@ def test_a_transcript_says_once_what_goes_on_in_silence() -> None:
 
 def test_a_transcript_ends_with_the_line_that_decided() -> None:
     ending = Ending("success@7", True, "success: agent.at(door)", "my.yaml", 7)
-    episode = record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {}, endings={"success@7": ending})
+    episode = film(Stand(HEARD), ACTIONS, {}, "an episode", {"success@7": ending})
     assert episode.transcript().splitlines()[-2:] == [
         "success (success@7) after 3 steps, reward 0.750",
         "success: agent.at(door)   my.yaml:7",
@@ -121,18 +132,18 @@ def test_a_transcript_ends_with_the_line_that_decided() -> None:
 def test_in_a_suite_the_ending_is_that_of_the_member() -> None:
     ending = Ending("one: success@7", True, "success: agent.at(door)", "one.yaml", 7)
     played = Stand(HEARD, member="one")
-    episode = record(played, PROGRAM, ACTIONS, "an episode", {}, endings={"one: success@7": ending})
+    episode = film(played, ACTIONS, {}, "an episode", {"one: success@7": ending})
     assert episode.transcript().splitlines()[-1] == "success: agent.at(door)   one.yaml:7"
 
 
 def test_the_film_has_a_picture_for_each_step_and_one_before(tmp_path: Path) -> None:
     recorded().save_film(tmp_path / "episode.gif")
-    with Image.open(tmp_path / "episode.gif") as film:
-        assert (film.n_frames, film.size) == (4, (640, 360))  # type: ignore[attr-defined]
-        film.seek(3)
-        assert film.info["duration"] > 1000
+    with Image.open(tmp_path / "episode.gif") as shown:
+        assert (shown.n_frames, shown.size) == (4, (640, 360))  # type: ignore[attr-defined]
+        shown.seek(3)
+        assert shown.info["duration"] > 1000
 
 
 def test_an_episode_that_goes_otherwise_is_a_bug_of_ours() -> None:
-    with pytest.raises(AssertionError, match="internal: played again, the episode ended=False at step 2"):
-        record(Stand(HEARD), PROGRAM, ACTIONS[:2], "an episode", {})
+    with pytest.raises(AssertionError, match="internal: played again, an episode goes on after 2 steps"):
+        film(Stand(HEARD), ACTIONS[:2], {}, "an episode")

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.episodes import trace_of
 from socialai_dsl.program_suite import outcome_name
-from socialai_dsl.replay import Thought, Trace, Tracer, trace_of, trace_schema
+from socialai_dsl.replay import Thought, Trace, Tracer, trace_schema
 from tests.quick import one_in
 from tests.tiny import Folder
 

@@ -10,12 +10,16 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 import socialai_dsl
+from socialai_dsl.episodes.play import Rooms
+from socialai_dsl.episodes.policies import (
+    FunctionPolicy,
+    Policy,
+    PredictingPolicy,
+    RandomPolicy,
+    ScriptedPolicy,
+)
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.episodes import Observation, Policy, RandomPolicy, ScriptedPolicy
 from socialai_dsl.loader.reader import shipped_folder
 from trainer.config import UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
@@ -135,6 +139,10 @@ class Player:
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
 
 
+Agent = str | Path | Player | Policy | Callable[[Any], Any]
+"""Whom `player_of` knows."""
+
+
 def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
     """What plays, and what is to be known about it, such as that it was trained on something else.
 
@@ -150,7 +158,7 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
             "checkpoint or a run folder"
         )
     if player.agent == "random":
-        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
+        return RandomPolicy(Rooms(envs).action_sizes, player.seed), []
     if player.agent == "oracle":
         return ScriptedPolicy(envs), []
     from trainer.play import CheckpointPolicy
@@ -163,11 +171,13 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
     return policy, [str(warning.message) for warning in caught]
 
 
-def player_of(agent: "str | Path | Player | Policy | Callable[[Any], Any]", scenario: str) -> Player:
-    """Who is meant by an agent: a name, a path, a `Player`, an object with `reset` and `act`, or a function.
+def player_of(agent: Agent, scenario: str) -> Player:
+    """Who is meant by an agent: a name, a path, a `Player`, a policy, a model of Stable-Baselines3, or a function.
 
     Args:
-        agent: a function is called with the observations of several environments, and returns int64 (E, heads).
+        agent: a policy has the methods `reset` and `act`, see `Policy`. A model has `predict`, as those of
+            Stable-Baselines3 have, and samples its actions. A function is called with the observations of several
+            rooms, and returns int64 (E, heads).
         scenario: for which `shipped` is looked up.
 
     Raises:
@@ -183,26 +193,14 @@ def player_of(agent: "str | Path | Player | Policy | Callable[[Any], Any]", scen
     name = getattr(agent, "__name__", type(agent).__name__)
     if all(callable(getattr(agent, method, None)) for method in ("reset", "act")):
         return Player(name, policy=agent)  # type: ignore[arg-type]
+    if callable(getattr(agent, "predict", None)):
+        return Player(name, policy=PredictingPolicy(agent))
     if callable(agent):
-        return Player(name, policy=_FunctionPolicy(agent))
+        return Player(name, policy=FunctionPolicy(agent))
     raise ValueError(
-        f"agent: got {agent!r}, expected a name, a path, a Player, an object with the methods reset and act, or a "
-        "function"
+        f"agent: got {agent!r}, expected a name, a path, a Player, an object with the methods reset and act, or with "
+        "predict, or a function"
     )
-
-
-class _FunctionPolicy:
-    """A function that remembers nothing, as a policy."""
-
-    def __init__(self, function: Callable[[Any], Any]) -> None:
-        self._function = function
-
-    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
-        """Nothing to forget."""
-
-    def act(self, observation: Observation) -> NDArray[np.int64]:
-        """See `Policy.act`."""
-        return np.asarray(self._function(observation))
 
 
 def require_trainer() -> None:

@@ -1,6 +1,6 @@
 """Records one episode for people: a film with its dialogue, and a transcript."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.program_suite import Playable, outcome_name
+from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, play
+from socialai_dsl.episodes.play import Step as RoomStep
+from socialai_dsl.episodes.policies import ReplayedPolicy
+from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.replay.endings import Ending
 from socialai_dsl.replay.steps import Step, describe_step
@@ -80,46 +83,62 @@ class RecordedEpisode:
         )
 
 
-def record(
+def film(
     env: Any,
-    program: Playable,
     actions: Sequence[NDArray[np.int64]],
+    reset: Mapping[str, Any],
     title: str,
-    reset: dict[str, Any],
-    meet: Callable[[], Sequence[Face]] = tuple,
     endings: Mapping[str, Ending] | None = None,
 ) -> RecordedEpisode:
     """Play one episode with given actions and record it.
 
     Args:
         env: a single environment with render mode `rgb_array`.
-        program: the scenario's, for the words of actions.
         actions: int64 (heads,) each; the last one ends the episode.
-        title: first line of the transcript; of a suite the member that is played is added.
         reset: arguments of `env.reset`.
-        meet: says who is in the room; asked after the reset.
+        title: first line of the transcript; of a suite the member that is played is added.
         endings: what the scenario's file says of each outcome, by name.
     """
-    _, info = env.reset(**reset)
-    cast = meet()
-    episode = RecordedEpisode(f"{title}: {info['member']}" if "member" in info else title)
-    dialogue: list[DialogueLine] = []
-    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""], cast=cast))
-    for t, action in enumerate(actions, start=1):
-        _, reward, terminated, truncated, info = env.step(action)
-        ended = bool(terminated or truncated)
-        assert ended == (t == len(actions)), f"internal: played again, the episode ended={ended} at step {t}"
-        step = describe_step(program, action, t, info["utterance"])
-        episode.steps.append(step)
-        episode.reward += float(reward)
-        dialogue += step.dialogue
-        if ended:
-            episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
-            episode.ending = (endings or {}).get(outcome_name(info))
-        episode.frames.append(
-            compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t, cast=cast)
+    filming = _Filming(title, endings or {})
+    rooms = Rooms(env, [filming])
+    play(rooms, {AGENT: ReplayedPolicy(actions)}, OneEpisode(reset))
+    assert not rooms.running.any(), f"internal: played again, {title} goes on after {len(actions)} steps"
+    return filming.episode
+
+
+class _Filming(Observer):
+    """Takes a picture after the reset and after each step."""
+
+    def __init__(self, title: str, endings: Mapping[str, Ending]) -> None:
+        self.episode = RecordedEpisode(title)
+        self._endings = endings
+        self._dialogue: list[DialogueLine] = []
+        self._cast: Sequence[Face] = ()
+
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """See `Observer.began`."""
+        if "member" in rooms.info:
+            self.episode.title += f": {rooms.info['member']}"
+        self._cast = rooms.env.cast()
+        self._add(rooms, ["before the first step", ""])
+
+    def stepped(self, rooms: Rooms, step: RoomStep) -> None:
+        """See `Observer.stepped`."""
+        episode, ended = self.episode, bool(step.ended[0])
+        words = describe_step(
+            rooms.env.program, step.actions[AGENT][0], len(episode.frames), step.info["utterance"]
         )
-    return episode
+        episode.steps.append(words)
+        episode.reward += float(step.reward[0])
+        self._dialogue += words.dialogue
+        if ended:
+            episode.outcome, episode.success = str(step.info["outcome"]), bool(step.success[0])
+            episode.ending = self._endings.get(outcome_name(step.info))
+        self._add(rooms, _caption(episode, words, ended), words.t)
+
+    def _add(self, rooms: Rooms, caption: list[str], now: int | None = None) -> None:
+        picture = rooms.env.render()
+        self.episode.frames.append(compose_frame(picture, self._dialogue, caption, now=now, cast=self._cast))
 
 
 def _caption(episode: RecordedEpisode, step: Step, ended: bool) -> list[str]:

@@ -15,18 +15,20 @@ from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.episodes.film import RecordedEpisode, film
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
+from socialai_dsl.episodes.players import Player, folder_of, make_policy, player_of, require_trainer
+from socialai_dsl.episodes.policies import Policy
+from socialai_dsl.episodes.results import Actions, EvalResult, Results
+from socialai_dsl.episodes.scripts import with_script
+from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.episodes import EvalResult, Policy, evaluate
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
-from socialai_dsl.evaluation.players import Player, folder_of, make_policy, player_of, require_trainer
-from socialai_dsl.evaluation.scripts import with_script
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
-from socialai_dsl.replay import Thought, Trace, trace_of
+from socialai_dsl.replay import Thought, Trace
 from socialai_dsl.replay.document import Outcome
 from socialai_dsl.replay.endings import Ending, endings_of, short_name
-from socialai_dsl.replay.film import RecordedEpisode, record
-from socialai_dsl.replay.tracing import Think
 from socialai_dsl.runs.folder import CONFIG, scenario_folder_name
 from trainer.config import scenario_in
 
@@ -110,15 +112,8 @@ class Evaluation:
         title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
-            return record(
-                env,
-                self.program,
-                self.actions[number],
-                title,
-                {"options": {"test_episode": number}},
-                env.cast,
-                endings,
-            )
+            reset = {"options": {"test_episode": number}}
+            return film(env, self.actions[number], reset, title, endings)
         finally:
             env.close()
 
@@ -158,15 +153,14 @@ def _thinking(policy: Any, number: int) -> Think:
     """Asks a trained agent what it makes of each observation of an episode."""
     policy.reset(np.ones(1, np.bool_), np.array([number]))
 
-    def think(observation: Any) -> Thought:
-        probabilities, value = policy.think(observation)
-        rounded = [[round(share, 4) for share in head] for head in probabilities]
-        return Thought(probabilities=rounded, value=round(value, 4))
+    def think(observation: Any) -> Thought | None:
+        policy.act({name: value[None] for name, value in observation.items()})
+        return thought_of(policy)
 
     return think
 
 
-def evaluate_agent(
+def evaluate(
     agent: str | Path | Player | Policy | Callable[[Any], Any], scenario: str, episodes: int = 500
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
@@ -194,7 +188,7 @@ def evaluate_agent(
 def play_test_set(
     player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int
 ) -> Evaluation:
-    """`evaluate_agent` of a scenario that is loaded and compiled."""
+    """`evaluate` of a scenario that is loaded and compiled."""
     endings = endings_of(loaded, program)
     if player.agent == "human" and player.policy is None:
         person = _let_a_person_play(player.kept_in, scenario, program, episodes)
@@ -214,15 +208,14 @@ def play_test_set(
         autoreset_mode="Disabled",
     )
     try:
-        loaded_policy, told = make_policy(player, envs)
-        policy = _Remembering(loaded_policy)
-        result = evaluate(policy, envs, episodes)
+        policy, told = make_policy(player, envs)
+        kept = Actions()
+        result = evaluate_policy(policy, envs, episodes, [kept])
     except ValueError as error:
         raise UsageError(f"{scenario}: {error}") from error
     finally:
         envs.close()
-    actions = {number: policy.played[number][:length] for number, length in enumerate(result.lengths)}
-    return Evaluation(scenario, loaded, program, player, result, endings, actions, told)
+    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
@@ -253,30 +246,31 @@ def _of_model(
     )
 
 
-class _Remembering:
-    """A policy that keeps its actions, so that an episode can be played again for the recording.
+def evaluate_policy(
+    policy: Policy, envs: Any, episodes: int = 500, observers: Sequence[Observer] = ()
+) -> EvalResult:
+    """Play test episodes 0 to `episodes - 1`, each exactly once.
 
-    Attributes:
-        played: number of an episode -> its actions, and perhaps more from after its end.
+    An environment whose episode has ended plays the next one that is left. The rooms are the same for every policy, and
+    the policy is told the number of each episode, so the result does not depend on the number of environments.
+
+    Args:
+        policy: the player; whether it samples, and with which seed, is its own affair.
+        envs: a vector environment with `autoreset_mode="Disabled"`, which plays and counts the test episodes alone.
+        episodes: N, at least the number of environments; the common test set has 500.
+        observers: watch as well.
+
+    Raises:
+        ValueError: `episodes` is less than 1 or than the number of environments, or these reset themselves; or the
+            policy's actions are not the scenario's.
     """
-
-    def __init__(self, policy: Policy) -> None:
-        self._policy = policy
-        self._numbers: list[int] = []
-        self.played: dict[int, list[NDArray[np.int64]]] = {}
-
-    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
-        """See `Policy.reset`."""
-        assert episodes is not None, "internal: test episodes have numbers"
-        self._numbers = episodes.tolist()
-        self._policy.reset(mask, episodes)
-
-    def act(self, observation: Any) -> NDArray[np.int64]:
-        """See `Policy.act`."""
-        actions = self._policy.act(observation)
-        for number, action in zip(self._numbers, actions.copy(), strict=True):
-            self.played.setdefault(number, []).append(action)
-        return actions
+    if episodes < 1:
+        raise ValueError(f"episodes: got {episodes}, expected at least 1")
+    results = Results(envs.program.outcomes, episodes)
+    before = envs.counters()["rules"]
+    play(Rooms(envs, [results, *observers]), {AGENT: policy}, TestEpisodes(episodes))
+    fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
+    return results.result(fired)
 
 
 def _let_a_person_play(

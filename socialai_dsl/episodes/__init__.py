@@ -1,0 +1,73 @@
+"""Episodes that are played: rooms, a policy on each seat, one loop, and observers that watch.
+
+* `play(rooms, players, agenda)`: the loop; `play_async` for policies that answer later.
+* `Policy`: what plays a seat. `RandomPolicy`, `ScriptedPolicy`, `FunctionPolicy`, `PredictingPolicy` (models of
+  Stable-Baselines3), `ReplayedPolicy` and `trainer.play.CheckpointPolicy` are some.
+* `Observer`: what watches rooms. `Results` counts, `Actions` keeps what was done, `Tracing` traces, and so does a film.
+* `Stage`: one room, played step by step with steps back, as the terminal and the studio do.
+"""
+
+from socialai_dsl.episodes.film import RecordedEpisode, film
+from socialai_dsl.episodes.play import (
+    AGENT,
+    Agenda,
+    EpisodesInARow,
+    Observer,
+    OneEpisode,
+    Rooms,
+    SeededRooms,
+    Step,
+    TestEpisodes,
+    play,
+    play_async,
+)
+from socialai_dsl.episodes.players import ModelOptions, Player
+from socialai_dsl.episodes.policies import (
+    FunctionPolicy,
+    Observation,
+    Policy,
+    PolicyDone,
+    PredictingPolicy,
+    RandomPolicy,
+    ReplayedPolicy,
+    ScriptedPolicy,
+    Streams,
+)
+from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
+from socialai_dsl.episodes.stage import Stage
+from socialai_dsl.episodes.traces import Tracing, trace, trace_of
+
+__all__ = [
+    "AGENT",
+    "Actions",
+    "Agenda",
+    "EpisodesInARow",
+    "EvalResult",
+    "FunctionPolicy",
+    "ModelOptions",
+    "Observation",
+    "Observer",
+    "OneEpisode",
+    "Player",
+    "Policy",
+    "PolicyDone",
+    "PredictingPolicy",
+    "RandomPolicy",
+    "RecordedEpisode",
+    "ReplayedPolicy",
+    "Results",
+    "Rooms",
+    "ScriptedPolicy",
+    "SeededRooms",
+    "Stage",
+    "Step",
+    "Streams",
+    "TestEpisodes",
+    "Tracing",
+    "film",
+    "play",
+    "play_async",
+    "trace",
+    "trace_of",
+    "wilson_interval",
+]

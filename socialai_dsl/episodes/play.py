@@ -1,0 +1,351 @@
+"""The loop that plays episodes: rooms with observers, a policy on each seat, and an agenda of what is played."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.episodes.policies import Observation, Policy, PolicyDone
+from socialai_dsl.program_suite import outcome_name
+
+Bools = NDArray[np.bool_]
+Int64 = NDArray[np.int64]
+Seat = str
+
+AGENT: Final[Seat] = "agent"
+"""The one seat that scenarios have."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of E rooms.
+
+    Attributes:
+        numbers: int64 (E,), the number of the episode in each room.
+        running: bool (E,), the rooms in which an episode went on before this step; the others count for nothing.
+        actions: of each seat, int64 (E, heads).
+        reward: float64 (E,).
+        ended: bool (E,), the rooms whose episode ended in this step, by an outcome or by the horizon.
+        success: bool (E,). outcome: int64 (E,), an index into the outcomes of what is played. Both count where `ended`.
+        info: what the environment returned.
+    """
+
+    numbers: Int64
+    running: Bools
+    actions: Mapping[Seat, Int64]
+    reward: NDArray[np.float64]
+    ended: Bools
+    success: Bools
+    outcome: Int64
+    info: Mapping[str, Any]
+
+
+class Observer:
+    """Watches rooms. The methods do nothing here; an observer has those that it needs."""
+
+    def began(self, rooms: Rooms, begun: Bools) -> None:
+        """Episodes have begun where `begun`, bool (E,); `rooms` has their numbers and first observations."""
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """A step has been played."""
+
+    def back(self, rooms: Rooms) -> None:
+        """The last step of the one room was taken back."""
+
+
+class Rooms:
+    """E rooms of a scenario, in which episodes go on. Whoever plays, plays here, and nobody else steps the environment.
+
+    Args:
+        env: what `make` or `make_vec` returns; a vector environment with `autoreset_mode="Disabled"`.
+        observers: are told of all that happens.
+
+    Attributes:
+        env: the environment itself, without wrappers.
+        count: E; 1 of a single environment.
+        observations: of each seat, arrays of E.
+        info: what the environment returned last.
+        numbers: int64 (E,), of the episodes; -1 where none has begun.
+        running: bool (E,), where an episode goes on.
+
+    Raises:
+        ValueError: the environment resets itself.
+    """
+
+    def __init__(self, env: Any, observers: Sequence[Observer] = ()) -> None:
+        self.env = env.unwrapped
+        self._many = isinstance(self.env, gymnasium.vector.VectorEnv)
+        if self._many:
+            mode = self.env.metadata.get("autoreset_mode")
+            if mode is not gymnasium.vector.AutoresetMode.DISABLED:
+                raise ValueError(f"envs: got the auto-reset mode {mode}, expected Disabled")
+        self.count = int(self.env.num_envs) if self._many else 1
+        self.observers = tuple(observers)
+        self.observations: dict[Seat, Observation] = {}
+        self.info: Mapping[str, Any] = {}
+        self.numbers, self.running = np.full(self.count, -1), np.zeros(self.count, np.bool_)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """The seats of a room."""
+        return (AGENT,)
+
+    @property
+    def action_sizes(self) -> tuple[int, ...]:
+        """The number of choices of each part of an action."""
+        space = self.env.single_action_space if self._many else self.env.action_space
+        return tuple(int(size) for size in space.nvec)
+
+    def begin(
+        self, reset: Mapping[str, Any], numbers: Int64 | None = None, begun: Bools | None = None
+    ) -> None:
+        """Begin episodes.
+
+        Args:
+            reset: arguments of `env.reset`; of a vector environment with a `reset_mask` unless all rooms begin.
+            numbers: int64 (E,), of the episodes; 0 by default.
+            begun: bool (E,), the rooms that begin; all by default.
+
+        Raises:
+            ValueError, RuntimeError: see `env.reset`; nothing has changed then.
+        """
+        mask = np.ones(self.count, np.bool_) if begun is None else begun
+        observation, self.info = self.env.reset(**reset)
+        self._see(observation)
+        self.numbers = np.where(mask, 0 if numbers is None else numbers, self.numbers)
+        self.running = self.running | mask
+        for observer in self.observers:
+            observer.began(self, mask)
+
+    def step(self, actions: Mapping[Seat, Int64]) -> Step:
+        """Play a step in all rooms.
+
+        Args:
+            actions: of each seat, int64 (E, heads).
+
+        Raises:
+            ValueError: an action is not one of the scenario's.
+        """
+        chosen = {seat: self._checked(seat, actions[seat]) for seat in self.seats}
+        step = self._step_many(chosen) if self._many else self._step_one(chosen)
+        self.running = self.running & ~step.ended
+        for observer in self.observers:
+            observer.stepped(self, step)
+        return step
+
+    def _checked(self, seat: Seat, actions: Any) -> Int64:
+        """Actions of the right shape. Raises ValueError for others; the environment looks at their range."""
+        found = np.asarray(actions)
+        shape = (self.count, len(self.action_sizes))
+        if found.shape != shape or found.dtype.kind not in "iu":
+            raise ValueError(
+                f"{seat}: got actions of the shape {found.shape} and the type {found.dtype}, expected whole numbers "
+                f"of the shape {shape}"
+            )
+        return found.astype(np.int64, copy=False)
+
+    def _step_many(self, actions: Mapping[Seat, Int64]) -> Step:
+        observation, reward, terminated, truncated, infos = self.env.step(actions[AGENT])
+        self.info = infos
+        self._see(observation)
+        ended = self.running & (terminated | truncated)
+        none = np.zeros(self.count, np.int64)
+        success, outcome = infos.get("success", none.astype(np.bool_)), infos.get("outcome", none)
+        return Step(self.numbers, self.running, actions, reward, ended, success, outcome, infos)
+
+    def _step_one(self, actions: Mapping[Seat, Int64]) -> Step:
+        observation, reward, terminated, truncated, info = self.env.step(actions[AGENT][0])
+        self.info = info
+        self._see(observation)
+        ended = bool(terminated or truncated)
+        outcome = self.env.program.outcomes.index(outcome_name(info)) if ended else 0
+        return Step(
+            self.numbers,
+            self.running,
+            actions,
+            np.array([reward], np.float64),
+            np.array([ended]),
+            np.array([bool(info.get("success", False))]),
+            np.array([outcome]),
+            info,
+        )
+
+    def _see(self, observation: Observation) -> None:
+        whole = observation if self._many else {name: value[None] for name, value in observation.items()}
+        self.observations = {AGENT: whole}
+
+
+class Agenda(Protocol):
+    """Which episodes are played."""
+
+    def following(self, room: int) -> int | None:
+        """The number of the next episode in a room; None if nothing is left for it."""
+
+    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
+        """The arguments of `env.reset` that begin these episodes, int64 (E,), where `begun`, bool (E,)."""
+
+
+class _Queue:
+    """Episodes 0 to N - 1, each once: a room plays the next one that is left."""
+
+    def __init__(self, episodes: int) -> None:
+        self._waiting = iter(range(episodes))
+
+    def following(self, room: int) -> int | None:
+        """See `Agenda.following`."""
+        return next(self._waiting, None)
+
+
+class TestEpisodes(_Queue):
+    """Episodes 0 to N - 1 of the test set."""
+
+    __test__ = False  # pytest takes it for a test
+
+    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
+        """See `Agenda.reset`."""
+        return {"options": {"reset_mask": begun, "test_episode": numbers.tolist()}}
+
+
+class SeededRooms(_Queue):
+    """Rooms 0 to N - 1 of a seed, an episode in each."""
+
+    def __init__(self, seed: int, episodes: int) -> None:
+        super().__init__(episodes)
+        self._seed = seed
+
+    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
+        """See `Agenda.reset`."""
+        return {"seed": self._seed, "options": {"reset_mask": begun, "index": numbers.tolist()}}
+
+
+class EpisodesInARow:
+    """The first K episodes of each room of a seed; those of room e are numbers e * K to e * K + K - 1.
+
+    To count the first episodes that end anywhere would count too many short ones.
+    """
+
+    def __init__(self, seed: int, each: int) -> None:
+        self._seed, self._each = seed, each
+        self._played: dict[int, int] = {}
+
+    def following(self, room: int) -> int | None:
+        """See `Agenda.following`."""
+        played = self._played.get(room, 0)
+        self._played[room] = played + 1
+        return room * self._each + played if played < self._each else None
+
+    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
+        """See `Agenda.reset`."""
+        if not (numbers % self._each)[begun].any() and begun.all():
+            return {"seed": self._seed}
+        return {"options": {"reset_mask": begun}}
+
+
+class OneEpisode:
+    """One episode, as `env.reset` takes it.
+
+    Args:
+        reset: its arguments.
+        number: of the episode, which policies and observers are told.
+    """
+
+    def __init__(self, reset: Mapping[str, Any], number: int = 0) -> None:
+        self._reset, self._number, self._played = dict(reset), number, False
+
+    def following(self, room: int) -> int | None:
+        """See `Agenda.following`."""
+        played, self._played = self._played, True
+        return None if played else self._number
+
+    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
+        """See `Agenda.reset`."""
+        return self._reset
+
+
+def play(
+    rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, stop: Callable[[], bool] = lambda: False
+) -> None:
+    """Play the episodes of an agenda. A room whose episode has ended plays the next one that is left.
+
+    Args:
+        rooms: where it is played; their observers see everything.
+        players: a policy for each seat.
+        agenda: which episodes.
+        stop: asked before each step whether to stop there.
+
+    Raises:
+        ValueError: a seat has no policy, or a policy's actions are not the scenario's; or there are more rooms than
+            episodes. What a policy raises says in a note where it was.
+    """
+    playing = play_async(rooms, players, agenda, stop)
+    if any(inspect.iscoroutinefunction(getattr(policy, "act", None)) for policy in players.values()):
+        asyncio.run(playing)
+        return
+    try:
+        playing.send(None)
+    except StopIteration:
+        return
+    playing.close()
+    raise ValueError("players: got a policy that answers later; declare its method act by `async def`")
+
+
+async def play_async(
+    rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, stop: Callable[[], bool] = lambda: False
+) -> None:
+    """`play`, with policies that answer later."""
+    if set(players) != set(rooms.seats):
+        raise ValueError(f"players: got {sorted(players)}, expected one for each of {list(rooms.seats)}")
+    ended = np.ones(rooms.count, np.bool_)
+    while True:
+        if ended.any():
+            _begin(rooms, players, agenda, ended)
+        if not rooms.running.any() or stop():
+            return
+        try:
+            actions = {seat: await _asked(rooms, seat, policy) for seat, policy in players.items()}
+        except PolicyDone:
+            return
+        ended = rooms.step(actions).ended
+
+
+def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: Bools) -> None:
+    """Begin what is next in the rooms whose episode has ended."""
+    numbers, begun = rooms.numbers.copy(), np.zeros(rooms.count, np.bool_)
+    for room in np.flatnonzero(ended).tolist():
+        number = agenda.following(room)
+        if number is not None:
+            numbers[room], begun[room] = number, True
+    if not begun.any():
+        return
+    if (numbers < 0).any():
+        raise ValueError(
+            f"envs: got {rooms.count} of them for {int(begun.sum())} episodes, expected at most as many"
+        )
+    rooms.begin(agenda.reset(begun, numbers), numbers, begun)
+    for policy in players.values():
+        policy.reset(begun.copy(), numbers.copy())
+
+
+async def _asked(rooms: Rooms, seat: Seat, policy: Policy) -> Int64:
+    """The actions that a policy chooses."""
+    try:
+        actions = policy.act(rooms.observations[seat])
+        return await actions if inspect.isawaitable(actions) else actions
+    except PolicyDone:
+        raise
+    except Exception as error:
+        going = rooms.numbers[rooms.running].tolist()
+        shown = (
+            f"episode {going[0]}"
+            if len(going) == 1
+            else f"{len(going)} episodes, number {going[0]} among them"
+        )
+        error.add_note(f"while {type(policy).__name__} played the seat {seat!r} of {shown}")
+        raise

@@ -1,0 +1,199 @@
+"""Policies: what chooses the actions of a seat, in one room or in many."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+Int64 = NDArray[np.int64]
+Observation = Mapping[str, NDArray[Any]]
+"""`image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L)."""
+
+# Streams that no numbered episode begins lie in a domain of keys of their own.
+_UNNUMBERED = 1 << 63
+
+
+class Policy(Protocol):
+    """What plays a seat of E rooms. It needs no base class: two methods are enough."""
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Forget the past of environments in which a new episode begins.
+
+        Args:
+            mask: bool (E,), true for those environments.
+            episodes: int64 (E,), the number of each environment's episode. The policy's random numbers in an episode
+                then depend on that number alone.
+        """
+
+    def act(self, observation: Observation) -> Int64 | Awaitable[Int64]:
+        """Choose actions, int64 (E, heads), given `image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L).
+
+        An asynchronous policy returns what the loop awaits.
+
+        Raises:
+            PolicyDone: play stops here, in the middle of the episode.
+        """
+
+
+class PolicyDone(Exception):  # noqa: N818 - no error
+    """A policy has no further action."""
+
+
+class RandomPolicy:
+    """Chance: every part of the action is drawn uniformly, so it speaks in half of the steps.
+
+    Args:
+        action_sizes: the number of choices of each part, `envs.single_action_space.nvec`.
+        seed: of the draws, 0 to 2**63 - 1.
+    """
+
+    def __init__(self, action_sizes: tuple[int, ...], seed: int = 0) -> None:
+        self._sizes = np.array(action_sizes)
+        self._streams = Streams(seed)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """See `Policy.reset`."""
+        self._streams.begin(mask, episodes)
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        drawn = self._streams.uniform(len(observation["tokens"]), len(self._sizes))
+        chosen: Int64 = (drawn * self._sizes).astype(np.int64)
+        return chosen
+
+
+class ScriptedPolicy:
+    """The scenario's own script for the agent.
+
+    Args:
+        envs: the environment that is played, single or vector, of a scenario whose agent follows a frame.
+    """
+
+    def __init__(self, envs: Any) -> None:
+        self._envs = envs.unwrapped
+        self._many = isinstance(self._envs, gymnasium.vector.VectorEnv)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Nothing to forget; the script's state is the environments'."""
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        found = self._envs.scripted_actions() if self._many else self._envs.scripted_action()[None]
+        return np.array(found, np.int64)
+
+
+class FunctionPolicy:
+    """A function that remembers nothing, from the observations of E rooms to int64 (E, heads)."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self._function = function
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: Observation) -> Any:
+        """See `Policy.act`."""
+        return self._function(observation)
+
+
+class PredictingPolicy:
+    """A model of Stable-Baselines3 or sb3-contrib, or whatever has its method `predict`; a recurrent one remembers.
+
+    Args:
+        model: the model; it samples, from PyTorch's own generator.
+        greedy: whether it takes its most probable actions instead.
+    """
+
+    def __init__(self, model: Any, greedy: bool = False) -> None:
+        self._model, self._greedy = model, greedy
+        self._state: Any = None
+        self._starts = np.ones(0, np.bool_)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """See `Policy.reset`."""
+        if len(self._starts) != len(mask):
+            self._state, self._starts = None, np.ones(len(mask), np.bool_)
+        self._starts = self._starts | mask
+
+    def act(self, observation: Observation) -> Any:
+        """See `Policy.act`."""
+        actions, self._state = self._model.predict(
+            dict(observation), state=self._state, episode_start=self._starts, deterministic=self._greedy
+        )
+        self._starts = np.zeros(len(self._starts), np.bool_)
+        return actions
+
+
+class ReplayedPolicy:
+    """The actions of an episode that was played before, for one room.
+
+    Args:
+        actions: int64 (heads,) each.
+    """
+
+    def __init__(self, actions: Iterable[Int64]) -> None:
+        self._actions = list(actions)
+        self._next = 0
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """See `Policy.reset`."""
+        self._next = 0
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        if self._next == len(self._actions):
+            raise PolicyDone
+        self._next += 1
+        return np.asarray(self._actions[self._next - 1], np.int64)[None]
+
+
+class Streams:
+    """One stream of random numbers for each of E environments.
+
+    A stream depends on the seed and on the number of the episode, not on how many environments are played together.
+    Where episodes have no numbers, it depends on the seed and the environment's index.
+
+    Args:
+        seed: 0 to 2**63 - 1.
+
+    Raises:
+        ValueError: the seed is out of range.
+    """
+
+    def __init__(self, seed: int) -> None:
+        if not 0 <= seed < _UNNUMBERED:
+            raise ValueError(f"seed: got {seed}, expected a whole number from 0 to 2**63 - 1")
+        self._seed = seed
+        self._streams: list[np.random.Generator] = []
+
+    def begin(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """Note that episodes begin where `mask`, bool (E,), with these numbers, int64 (E,), if they have any."""
+        self._require(len(mask))
+        if episodes is None:
+            return
+        for place in np.flatnonzero(mask).tolist():
+            self._streams[place] = _stream(self._seed, int(episodes[place]))
+
+    def uniform(self, count: int, width: int) -> NDArray[np.float64]:
+        """The next numbers of each stream, from 0 up to but not including 1, float64 (E, width)."""
+        self._require(count)
+        return np.stack([stream.random(width) for stream in self._streams])
+
+    def gumbel(self, count: int, width: int) -> NDArray[np.float32]:
+        """The next standard Gumbel numbers of each stream, float32 (E, width)."""
+        self._require(count)
+        return np.stack([stream.gumbel(size=width) for stream in self._streams]).astype(np.float32)
+
+    def _require(self, count: int) -> None:
+        """Make the streams of `count` environments, if there are others or none."""
+        if len(self._streams) != count:
+            self._streams = [_stream(self._seed | _UNNUMBERED, place) for place in range(count)]
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    """Philox, whose streams of different keys are independent (Salmon et al. 2011)."""
+    return np.random.Generator(np.random.Philox(key=np.array([seed, number], np.uint64)))

@@ -1,0 +1,139 @@
+"""The results of played episodes, and how sure they make one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
+
+# The two-sided 95 % quantile of the normal distribution.
+_Z = 1.959963984540054
+
+
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
+    """The 95 % confidence interval of a success rate (Wilson 1927, the score interval without correction).
+
+    Unlike rate ± 2 standard errors it stays within 0 and 1, and it has a width where all trials had one result.
+
+    Raises:
+        ValueError: there was no trial, or there were more successes than trials.
+    """
+    if not 0 <= successes <= trials or trials < 1:
+        raise ValueError(
+            f"got {successes} successes of {trials} trials, expected 0 to `trials` of at least one"
+        )
+    rate, spread = successes / trials, _Z * _Z / trials
+    centre = (rate + spread / 2) / (1 + spread)
+    half = math.sqrt(rate * (1 - rate) * spread + spread * spread / 4) / (1 + spread)
+    # At the ends the formula gives 0 and 1 but for rounding.
+    low = 0.0 if successes == 0 else centre - half
+    high = 1.0 if successes == trials else centre + half
+    return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class EvalResult:
+    """The result of a policy on test episodes 0 to N - 1.
+
+    Attributes:
+        success: bool (N,), whether each episode ended in success.
+        outcome: int64 (N,), how each ended, as an index into `names`.
+        lengths: int64 (N,), in steps.
+        returns: float64 (N,), the undiscounted sum of rewards.
+        names: the scenario's outcomes.
+        rules: mean number of times that each rule of the scenario fired in an episode.
+    """
+
+    success: NDArray[np.bool_]
+    outcome: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+    returns: NDArray[np.float64]
+    names: tuple[str, ...]
+    rules: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def episodes(self) -> int:
+        """N, the number of episodes, each played once."""
+        return len(self.success)
+
+    @property
+    def success_rate(self) -> float:
+        """Share of the episodes that ended in success."""
+        return float(self.success.mean())
+
+    @property
+    def success_rate_se(self) -> float:
+        """The binomial standard error of `success_rate`."""
+        return math.sqrt(self.success_rate * (1 - self.success_rate) / self.episodes)
+
+    @property
+    def success_interval(self) -> tuple[float, float]:
+        """The 95 % confidence interval of `success_rate` by `wilson_interval`."""
+        return wilson_interval(int(self.success.sum()), self.episodes)
+
+    @property
+    def mean_length(self) -> float:
+        """Mean length of an episode in steps."""
+        return float(self.lengths.mean())
+
+    @property
+    def mean_return(self) -> float:
+        """Mean undiscounted return of an episode."""
+        return float(self.returns.mean())
+
+    @property
+    def outcomes(self) -> dict[str, float]:
+        """Share of the episodes that ended in each of the scenario's outcomes."""
+        return {name: float((self.outcome == index).mean()) for index, name in enumerate(self.names)}
+
+
+class Results(Observer):
+    """Notes how each of N episodes ended.
+
+    Args:
+        names: the scenario's outcomes.
+        episodes: N; episodes are numbered 0 to N - 1.
+    """
+
+    def __init__(self, names: Sequence[str], episodes: int) -> None:
+        self._names = tuple(names)
+        self._success, self._outcome = np.zeros(episodes, np.bool_), np.full(episodes, -1)
+        self._lengths, self._returns = np.zeros(episodes, np.int64), np.zeros(episodes)
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        numbers = step.numbers[step.running]
+        self._lengths[numbers] += 1
+        self._returns[numbers] += step.reward[step.running]
+        if step.ended.any():
+            numbers = step.numbers[step.ended]
+            self._success[numbers] = step.success[step.ended]
+            self._outcome[numbers] = step.outcome[step.ended]
+
+    def result(self, rules: Mapping[str, float] | None = None) -> EvalResult:
+        """The results of all N episodes, with the mean number of times that each rule fired."""
+        return EvalResult(
+            self._success, self._outcome, self._lengths, self._returns, self._names, rules or {}
+        )
+
+
+class Actions(Observer):
+    """Keeps the actions, so that an episode can be played again to be filmed or traced.
+
+    Attributes:
+        played: number of an episode -> its actions, int64 (heads,) each.
+    """
+
+    def __init__(self) -> None:
+        self.played: dict[int, list[NDArray[np.int64]]] = {}
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        numbers, actions = step.numbers.tolist(), step.actions[AGENT].copy()
+        for room in np.flatnonzero(step.running).tolist():
+            self.played.setdefault(numbers[room], []).append(actions[room])
