@@ -215,8 +215,12 @@ def test_json_of_any_form_is_a_reply(url: str, action: dict[str, Any], understoo
     [
         (["talkitour"], 2, "did you mean `talkitout`?"),
         (["help", "--host", "no.such.host.invalid"], 2, "cannot serve on no.such.host.invalid:8000"),
-        (["help", "--port", "99999"], 2, "cannot serve on 127.0.0.1:99999"),
-        (["help", "--idle", "0"], 2, "--idle: expected a number of seconds above 0, got '0'"),
+        (["help", "--port", "99999"], 2, "--port: got 99999, expected at most 65535"),
+        (
+            ["help", "--idle", "0"],
+            2,
+            "--idle: expected a number of seconds above 0, at most 31622400, got '0'",
+        ),
     ],
 )
 def test_mistakes_are_told(
