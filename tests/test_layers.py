@@ -85,17 +85,16 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "pydantic", "PIL"},
     ),
     "episodes": (
-        TEXT_SIDE | {"", "errors", "program", "program_suite", "envs", "render", "replay"},
+        TEXT_SIDE | {"errors", "program", "program_suite", "envs", "render", "replay"},
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (
-        TEXT_SIDE
-        | {"", "errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"},
+        TEXT_SIDE | {"errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"},
         {"numpy", "rich", "textual"},
     ),
     "evaluation": (
         TEXT_SIDE
-        | {"", "errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
+        | {"errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
         | {"episodes", "replay", "llm", "play", "experiments", "runs.folder", "runs.versions"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
@@ -132,18 +131,9 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
 }
 
-# What the trainer may use: the facade's names, and the models of a curriculum, which it plays; nothing below.
-FACADE = {"socialai_dsl"} | {
-    f"socialai_dsl.{name}"
-    for name in (
-        "load",
-        "load_curriculum",
-        "compile",
-        "make",
-        "make_vec",
-        "episodes.policies",
-        "schema.curriculum",
-    )
+# What the trainer may use: environments, curricula, and what plays episodes; no scenario's insides.
+FACADE = {
+    f"socialai_dsl.{name}" for name in ("envs.factory", "episodes.policies", "frontend", "schema.curriculum")
 }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-import socialai_dsl
+from socialai_dsl.envs.factory import make
 from socialai_dsl.episodes.policies import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
@@ -79,7 +79,7 @@ class CheckpointPolicy:
             scenario = _scenario_of(located(path), checkpoint.meta.config.scenario)
             if not scenario:
                 raise CheckpointError(f"{path}: does not say which scenario it is for, expected envs")
-            envs = socialai_dsl.make(scenario)
+            envs = make(scenario)
         restored = checkpoints.restore_net(checkpoint, NetSpec.of(envs.unwrapped), net, folder)
         warn_of_differences(checkpoint.meta, envs.unwrapped.program)
         return cls(restored.to(device), greedy, seed)

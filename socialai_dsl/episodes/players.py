@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, Literal
 
-import socialai_dsl
 from socialai_dsl.episodes.play import Rooms
 from socialai_dsl.episodes.policies import (
     FunctionPolicy,
@@ -20,6 +19,7 @@ from socialai_dsl.episodes.policies import (
     ScriptedPolicy,
 )
 from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
 from trainer.config import UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
@@ -236,7 +236,7 @@ def named_agent(agent: str, scenario: str) -> str:
     """
     if agent != "shipped":
         return agent
-    path, shipped = socialai_dsl.load(scenario).resolved.path, shipped_folder().resolve()
+    path, shipped = load(scenario).resolved.path, shipped_folder().resolve()
     _, *variants = scenario.partition("?")[0].split("+")
     known = shipped_agents()
     if path.is_relative_to(shipped):

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import socialai_dsl
 from socialai_dsl.checking.loaded import about_of
+from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
@@ -22,6 +22,7 @@ from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import load
 from socialai_dsl.replay.document import Outcome, Thought, Trace
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.state import cast_of
@@ -230,7 +231,7 @@ class TracedEpisode:
         if player.is_script:
             scenario = with_script(scenario).name
         self.scenario, self.agent = scenario, player.agent
-        self._env: Any = socialai_dsl.make(scenario, render_mode="ansi").unwrapped
+        self._env: Any = make(scenario, render_mode="ansi").unwrapped
         drawn = agent.seed if isinstance(agent, Player) else seed
         self._policy = self._typed(lines) if lines is not None else self._made(replace(player, seed=drawn))
         self._reset: dict[str, Any] = {}
@@ -266,8 +267,8 @@ class TracedEpisode:
 
     def document(self) -> Trace:
         """What was played so far, as a trace: played again, without the script."""
-        loaded = socialai_dsl.load(self._asked)
-        env: Any = socialai_dsl.make(self._asked)
+        loaded = load(self._asked)
+        env: Any = make(self._asked)
         try:
             return trace_of(
                 env,

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import socialai_dsl
+from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, EpisodesInARow, Rooms, play
 from socialai_dsl.episodes.policies import Observation
 from socialai_dsl.episodes.results import Results
@@ -53,7 +53,7 @@ def play_at_random(scenario: str, episodes: int, seed: int) -> Sample:
     """
     count = min(_TOGETHER, episodes)
     each = -(-episodes // count)
-    envs: Any = socialai_dsl.make_vec(scenario, num_envs=count, copy=False, autoreset_mode="Disabled")
+    envs: Any = make_vec(scenario, num_envs=count, copy=False, autoreset_mode="Disabled")
     results = Results(envs.outcomes, count * each)
     try:
         rooms = Rooms(envs, [results])

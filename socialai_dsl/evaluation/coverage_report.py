@@ -11,15 +11,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import socialai_dsl
 from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.analysis.tally import Tally, TallyItem, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import load
 from trainer.config import UNTRAINED
 
 _TOGETHER: Final = 250
@@ -78,21 +79,19 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 def _parts(scenario: str) -> list[TallyItem]:
     """Everything in a scenario that can come about."""
-    return [part for checked in scenarios_of(socialai_dsl.load(scenario)) for part in parts_of(checked)]
+    return [part for checked in scenarios_of(load(scenario)) for part in parts_of(checked)]
 
 
 def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -> Tally:
     """Let an agent play. What happens in episodes that the clock breaks off counts."""
-    envs: Any = socialai_dsl.make_vec(
-        scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled"
-    )
+    envs: Any = make_vec(scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled")
     try:
         if agent not in UNTRAINED:
             require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
             warnings.warn(warning, stacklevel=2)
-        counting = Counting(Watch(envs, scenarios_of(socialai_dsl.load(scenario))))
+        counting = Counting(Watch(envs, scenarios_of(load(scenario))))
 
         def over() -> bool:
             clock.progress(f"{counting.ended} of {episodes} episodes played")

@@ -8,15 +8,17 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-import socialai_dsl
 from socialai_dsl.analysis.depth import without_npcs
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.atomic import write_json
 from socialai_dsl.baselines import Baselines, Level
+from socialai_dsl.checking.loaded import Loaded, LoadedSuite
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.test_set import evaluate
+from socialai_dsl.frontend import load
 
 
 def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
@@ -30,7 +32,7 @@ def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
     Raises:
         ScenarioError: the scenario has mistakes.
     """
-    loaded = socialai_dsl.load(scenario)
+    loaded = load(scenario)
     try:
         script = _played(scenario, "oracle", episodes)
     except UsageError:
@@ -39,7 +41,7 @@ def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
         script=script,
         chance=_played(scenario, "random", episodes),
         without_npcs=_alone(loaded, rooms),
-        program_sha256=socialai_dsl.compile(loaded).sha256,
+        program_sha256=compile_loaded(loaded).sha256,
     )
 
 
@@ -78,7 +80,7 @@ def update_baselines(
 
 
 def _digest(scenario: str) -> str:
-    return socialai_dsl.compile(socialai_dsl.load(scenario)).sha256
+    return compile_loaded(load(scenario)).sha256
 
 
 def _played(scenario: str, agent: str, episodes: int) -> Level:
@@ -86,8 +88,8 @@ def _played(scenario: str, agent: str, episodes: int) -> Level:
     return Level(result.success_rate, result.success_rate_se, f"{episodes} test episodes")
 
 
-def _alone(loaded: socialai_dsl.LoadedScenario | socialai_dsl.LoadedSuite, rooms: int) -> Level | None:
-    if isinstance(loaded, socialai_dsl.LoadedSuite):
+def _alone(loaded: Loaded, rooms: int) -> Level | None:
+    if isinstance(loaded, LoadedSuite):
         return None
     alone = without_npcs(loaded, Effort(rooms=rooms))
     if alone is None:

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-import socialai_dsl
 from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.analysis.search import Finding, search_rooms
+from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
 from socialai_dsl.episodes.policies import ScriptedPolicy
 from socialai_dsl.episodes.scripts import with_script
@@ -205,9 +205,7 @@ class _Played(Observer):
 def _play(scripted: str, played: _Played, seed: int, clock: Clock) -> None:
     """Play one episode in each room."""
     rooms = len(played.over)
-    envs: Any = socialai_dsl.make_vec(
-        scripted, num_envs=min(rooms, _TOGETHER), copy=False, autoreset_mode="Disabled"
-    )
+    envs: Any = make_vec(scripted, num_envs=min(rooms, _TOGETHER), copy=False, autoreset_mode="Disabled")
 
     def over() -> bool:
         clock.progress(f"{scripted}: {int(played.over.sum())} of {rooms} rooms played")
@@ -223,7 +221,7 @@ def _search(scenario: str, indices: list[int], seed: int, states: int, clock: Cl
     """What is found of these rooms, one after the other, until the clock is over."""
     if not indices or clock.is_over:
         return
-    envs = socialai_dsl.make_vec(scenario, num_envs=len(indices))
+    envs = make_vec(scenario, num_envs=len(indices))
     try:
         envs.reset(seed=seed, options={"index": indices})
         for number, finding in enumerate(search_rooms(envs, list(range(len(indices))), states, clock), 1):

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import socialai_dsl
 from socialai_dsl.atomic import read_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.checking.loaded import Loaded, about_of
-from socialai_dsl.compilation import scenarios_of
-from socialai_dsl.envs.factory import compiled
+from socialai_dsl.compilation import compile_loaded, scenarios_of
+from socialai_dsl.envs.factory import compiled, make, make_vec
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
@@ -24,6 +23,7 @@ from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
+from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 from socialai_dsl.replay import Thought, Trace
@@ -108,7 +108,7 @@ class Evaluation:
             number: of the test episode.
             label: how the recording calls the agent.
         """
-        env = socialai_dsl.make(self.program, render_mode="rgb_array")
+        env = make(self.program, render_mode="rgb_array")
         title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
@@ -181,7 +181,7 @@ def evaluate(
     if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
         raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
     player = player_of(agent, scenario)
-    loaded = socialai_dsl.load(scenario)
+    loaded = load(scenario)
     return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
 
 
@@ -201,7 +201,7 @@ def play_test_set(
         return _of_model(played, scenario, loaded, program, player)
     if player.is_trained:
         require_trainer()
-    envs = socialai_dsl.make_vec(
+    envs = make_vec(
         compiled(with_script(scenario, loaded).loaded) if player.is_script else program,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
@@ -225,8 +225,8 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
         ScenarioError: the scenario has mistakes.
         UsageError: the folder holds no episodes of this scenario.
     """
-    loaded = socialai_dsl.load(scenario)
-    program = socialai_dsl.compile(loaded)
+    loaded = load(scenario)
+    program = compile_loaded(loaded)
     return _of_model(episodes_of_model(run, program, most), scenario, loaded, program, Player(agent, out=run))
 
 
@@ -299,8 +299,8 @@ def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
     from socialai_dsl.play.game import finished_episodes
     from socialai_dsl.play.journal import FILE, read_journal
 
-    loaded = socialai_dsl.load(scenario)
-    program = socialai_dsl.compile(loaded)
+    loaded = load(scenario)
+    program = compile_loaded(loaded)
     try:
         about, played = read_journal(run / FILE)[0], finished_episodes(run / FILE)
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -8,13 +8,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.typed import Phrases
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage
+from socialai_dsl.frontend import load
 from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 from socialai_dsl.render.panel import DialogueLine
@@ -124,8 +125,8 @@ class Game(Observer):
     """
 
     def __init__(self, scenario: str) -> None:
-        loaded = socialai_dsl.load(scenario)
-        self._stage = Stage(socialai_dsl.make(scenario), [self])
+        loaded = load(scenario)
+        self._stage = Stage(make(scenario), [self])
         self._env: ScenarioEnv = self._stage.env
         self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}

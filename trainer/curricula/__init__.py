@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from socialai_dsl import load_curriculum
+from socialai_dsl.frontend import load_curriculum
 from trainer.curricula.base import Curriculum, Leaves, Tutor
 from trainer.curricula.even import EvenFrames
 from trainer.curricula.phases import Phases
