@@ -12,7 +12,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from socialai_dsl.cli.experiment_tables import clock, seconds_left
+from socialai_dsl.cli.experiment_tables import clock
+from socialai_dsl.experiments.figures import seconds_left
 from socialai_dsl.experiments.folder import PlannedRun
 
 _SECONDS_BETWEEN_LINES: Final = 30.0

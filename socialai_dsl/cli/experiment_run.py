@@ -9,21 +9,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_document import asked_for, threads, workers
 from socialai_dsl.cli.experiment_progress import RunsProgress
-from socialai_dsl.cli.experiment_tables import status_figures, status_text
+from socialai_dsl.cli.experiment_tables import status_text
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.episodes.players import require_trainer
 from socialai_dsl.errors import UsageError
-from socialai_dsl.experiments.document import differences
 from socialai_dsl.experiments.driver import drive
 from socialai_dsl.experiments.engines import Engine, MissingEngineError
 from socialai_dsl.experiments.engines.local import LocalEngine
 from socialai_dsl.experiments.engines.ray import RayEngine
 from socialai_dsl.experiments.engines.slurm import SlurmEngine
-from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, PlannedRun, read_experiment, runs_of
+from socialai_dsl.experiments.figures import status_figures
+from socialai_dsl.experiments.folder import PlannedRun, runs_of
+from socialai_dsl.experiments.request import prepare, requested, threads, workers
 from socialai_dsl.experiments.work import Outcome
 from socialai_dsl.runs.folder import only_writer
 
@@ -31,36 +30,15 @@ from socialai_dsl.runs.folder import only_writer
 def run(arguments: argparse.Namespace) -> Exit:
     """Make the folder, or go on in it, and do the runs that are left."""
     require_trainer()
-    document, folder = asked_for(arguments)
+    document, folder = requested(arguments.file, arguments.profile, arguments.out)
     if arguments.address is not None and arguments.engine != "ray":
         raise UsageError("--address: only the engine `ray` has one")
     if arguments.slurm and arguments.engine != "slurm":
         raise UsageError("--slurm: only the engine `slurm` has jobs")
     with only_writer(folder):  # the runs have locks of their own, so that several commands may work on them
-        _prepare(folder, document, arguments)
+        prepare(folder, document, arguments.runs, arguments.update)
     engine = _engine(arguments, document, folder)
     return work_on(folder, document, runs_of(folder, document), engine, arguments.json)
-
-
-def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespace) -> None:
-    """Make the experiment's folder, or see that it is one of the same experiment."""
-    if (folder / EXPERIMENT).exists():
-        changed = differences(read_experiment(folder), document)
-        if changed and not arguments.update:
-            shown = changed[:10] + ([f"and {len(changed) - 10} more"] if len(changed) > 10 else [])
-            listed = "".join(f"\n  {line}" for line in shown)
-            raise UsageError(
-                f"{folder} is of another experiment or of an earlier state of this one:{listed}\n"
-                "Choose another --out; or let the folder follow with --update, which keeps the runs that are the same"
-            )
-    runs = folder / RUNS
-    if arguments.runs is not None and runs.resolve() != arguments.runs.resolve():
-        if runs.exists() or runs.is_symlink():
-            raise UsageError(f"--runs: {runs} exists already, so its runs stay there")
-        arguments.runs.mkdir(parents=True, exist_ok=True)
-        runs.symlink_to(arguments.runs.resolve(), target_is_directory=True)
-    runs.mkdir(exist_ok=True)
-    write_json(folder / EXPERIMENT, document)
 
 
 def _engine(arguments: argparse.Namespace, document: dict[str, Any], folder: Path) -> Engine:

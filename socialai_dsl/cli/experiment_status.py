@@ -5,12 +5,12 @@ import sys
 
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_tables import status_figures, status_text
+from socialai_dsl.cli.experiment_tables import status_text
 from socialai_dsl.cli.terminal import counted, json_text
-from socialai_dsl.diagnostics import suggested
-from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments import work
+from socialai_dsl.experiments.figures import status_figures
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
+from socialai_dsl.experiments.request import chosen_runs
 
 
 def status(arguments: argparse.Namespace) -> Exit:
@@ -25,14 +25,18 @@ def status(arguments: argparse.Namespace) -> Exit:
 
 def retry(arguments: argparse.Namespace) -> Exit:
     """Let the next `run` repeat runs that failed or were cancelled."""
-    chosen = _chosen(arguments)
+    chosen = chosen_runs(arguments.folder, arguments.runs)
     wanted = [run for run in chosen if run.shown_status.state in ("failed", "cancelled")]
     return _tell(arguments, "waiting", wanted, {run.id for run in wanted if work.retry(run)})
 
 
 def cancel(arguments: argparse.Namespace) -> Exit:
     """Give up runs that have not ended."""
-    wanted = [run for run in _chosen(arguments) if run.shown_status.state in ("waiting", "running")]
+    wanted = [
+        run
+        for run in chosen_runs(arguments.folder, arguments.runs)
+        if run.shown_status.state in ("waiting", "running")
+    ]
     for run in wanted:
         work.cancel(run)
     return _tell(arguments, "cancelled", wanted, {run.id for run in wanted})
@@ -51,20 +55,3 @@ def _tell(arguments: argparse.Namespace, state: str, wanted: list[PlannedRun], c
                 file=sys.stderr,
             )
     return Exit.FINDINGS if missed else Exit.GOOD
-
-
-def _chosen(arguments: argparse.Namespace) -> list[PlannedRun]:
-    document = read_experiment(arguments.folder)
-    runs = runs_of(arguments.folder, document)
-    if not arguments.runs:
-        return runs
-    names: dict[str, set[str]] = {}
-    for entry in document["runs"]:
-        names.setdefault(entry["condition"], set()).add(entry["id"])
-        names.setdefault(entry["id"], set()).add(entry["id"])
-    for word in arguments.runs:
-        if word not in names:
-            hint = suggested(word, names)
-            raise UsageError(f"RUN: {arguments.folder} has no run and no condition {word!r}{hint}")
-    wanted = set().union(*(names[word] for word in arguments.runs))
-    return [run for run in runs if run.id in wanted]

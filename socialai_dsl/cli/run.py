@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
+from socialai_dsl.atomic import read_json
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.run_options import add_options, typed_options
 from socialai_dsl.cli.terminal import json_text
@@ -23,6 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<scenario>/<time>-s<seed>)"
     )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a JSON file of options by name, instead of SCENARIO and options",
+    )
     parser.add_argument("--resume", type=Path, metavar="RUN_DIR", help="continue a run that was stopped")
     parser.add_argument("--json", action="store_true", help="print only the result, as a JSON object")
 
@@ -40,21 +47,26 @@ def _run(arguments: argparse.Namespace) -> Run:
     from socialai_dsl.cli.progress import RunProgress
     from socialai_dsl.runs.train import resume, train
 
-    options = typed_options(arguments)
+    options, scenario = typed_options(arguments), arguments.scenario
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
-    with RunProgress(stream, arguments.scenario) as shown:
+    if arguments.config is not None:
+        if scenario is not None or options or arguments.resume is not None:
+            raise UsageError("--config: the file says all options; give neither SCENARIO nor others")
+        options = read_json(arguments.config)
+        scenario = options.pop("scenario", None)
+    with RunProgress(stream, scenario) as shown:
         if arguments.resume is not None:
-            if arguments.scenario is not None or arguments.out is not None:
+            if scenario is not None or arguments.out is not None:
                 raise UsageError(
                     "--resume: the run's folder says which scenario it is; give neither SCENARIO nor --out"
                 )
             return resume(arguments.resume, progress=shown.update, **options)
-        if arguments.scenario is None:
+        if not isinstance(scenario, str):
             raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
         if options.get("agent") == "human" and arguments.json:
             raise UsageError("--json: the agent 'human' plays on standard output")
-        return train(arguments.scenario, out=arguments.out, progress=shown.update, **options)
+        return train(scenario, out=arguments.out, progress=shown.update, **options)
 
 
 def _table(result: dict[str, Any], run: Run) -> str:

@@ -13,6 +13,7 @@ from socialai_dsl.atomic import read_json
 from socialai_dsl.errors import UnreadableError, first_mistake
 from socialai_dsl.experiments.record import ExperimentRecord
 from socialai_dsl.runs.folder import Run
+from trainer.config import UNTRAINED
 
 EXPERIMENT: Final = "experiment.json"
 RUNS: Final = "runs"
@@ -35,6 +36,18 @@ class PlannedRun(Run):
     def label(self) -> str:
         """What people call the run."""
         return f"{self.condition['name']}, seed {self.seed}"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Its options by name, scenario, agent and seed among them, as `socialai run --config` takes them."""
+        condition = self.condition
+        options = {name: value for name, value in condition["options"].items() if name != "hyper"}
+        if condition["agent"] in UNTRAINED:
+            options.pop("device", None)
+        if condition["frames"] is not None:
+            options["frames"] = condition["frames"]
+        named = {"scenario": condition["scenario"], "agent": condition["agent"], "seed": self.seed}
+        return named | options | condition["options"].get("hyper", {})
 
     @property
     def missing_tests(self) -> list[str]:

@@ -16,16 +16,15 @@ from typing import IO, Final
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.errors import UnreadableError, described_error
-from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
-from socialai_dsl.runs.folder import CANCEL, CHECKPOINTS, CONFIG, TESTS
+from socialai_dsl.runs.folder import CANCEL, CHECKPOINTS, CONFIG, OPTIONS, TESTS
 from socialai_dsl.runs.lock import HeldError
 from socialai_dsl.runs.status import State, Status
+from trainer.config import UNTRAINED
 from trainer.files import checkpoint_files
 
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
-_WITHOUT_NETWORK: Final = ("random", "oracle")
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
 _SECONDS_TO_SAVE: Final = 10.0
 """How long a process that is ended may take to save its checkpoint."""
@@ -167,6 +166,10 @@ class _Work:
         self._run.write_status(self._status)
         return outcome, self._status.message or ""
 
+    @property
+    def _is_trained(self) -> bool:
+        return bool(self._condition["agent"] == "ppo")
+
     # -- the two parts of a run ------------------------------------------------------------------------------
 
     def _train(self) -> None:
@@ -208,29 +211,24 @@ class _Work:
         write_json(self._run.folder / TESTS, self._run.tested | figures)
 
     def _run_command(self) -> list[str]:
-        path, condition = self._run.folder, self._condition
-        config = path / CONFIG
-        if condition["agent"] == "ppo" and config.exists() and checkpoint_files(path / CHECKPOINTS):
-            return ["run", "--resume", str(path), "--json"]
+        folder = self._run.folder
+        config = folder / CONFIG
+        if self._is_trained and config.exists() and checkpoint_files(folder / CHECKPOINTS):
+            return ["run", "--resume", str(folder), "--json"]
         config.unlink(missing_ok=True)  # of a process that was killed before there was anything to resume
-        command = ["run", condition["scenario"], "--agent", condition["agent"], "--seed", str(self._run.seed)]
-        if condition["frames"] is not None:
-            command += ["--frames", str(condition["frames"])]
-        for key, value in condition["options"].items():
-            if key != "device" or condition["agent"] not in _WITHOUT_NETWORK:
-                command += typed(key, value)
-        return [*command, "--out", str(path), "--json"]
+        write_json(folder / OPTIONS, self._run.options)
+        return ["run", "--config", str(folder / OPTIONS), "--out", str(folder), "--json"]
 
     def _test_command(self, scenarios: Sequence[str]) -> list[str]:
         condition, options = self._condition, self._condition["options"]
-        agent = str(self._run.folder) if condition["agent"] == "ppo" else condition["agent"]
+        agent = str(self._run.folder) if self._is_trained else condition["agent"]
         command = [
             "evaluate",
             agent,
             "--episodes",
             str(options["eval_episodes"]),
         ]
-        if agent not in _WITHOUT_NETWORK:
+        if agent not in UNTRAINED:
             command += ["--device", options["device"]]
         if agent not in ("oracle", str(self._run.folder)):
             command += ["--seed", str(self._run.seed)]

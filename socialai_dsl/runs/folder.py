@@ -26,6 +26,9 @@ from trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
 __all__ = ["CHECKPOINTS", "METRICS", "SCENARIO", "STARTS"]
 
 CONFIG: Final = "config.json"
+OPTIONS: Final = "options.json"
+"""What an experiment asks a run for, of which `config.json` is what came of it."""
+
 RESULT: Final = "result.json"
 CARD: Final = "model_card.md"
 CURVE: Final = "learning_curve.png"

@@ -125,10 +125,12 @@ def resolved_device(device: str) -> str:
     """`auto` is a graphics card where there is one.
 
     Raises:
-        OptionError: `cuda` was asked for and is not there.
+        OptionError: `cuda` was asked for and is not there, or something else was.
     """
     import torch
 
+    if device not in ("auto", "cpu", "cuda"):
+        raise OptionError("device", f"got {device!r}, expected auto, cpu or cuda")
     available = torch.cuda.is_available()
     if device == "cuda" and not available:
         raise OptionError("device", "got cuda, and PyTorch finds no CUDA device on this machine")

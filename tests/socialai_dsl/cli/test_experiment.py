@@ -10,7 +10,6 @@ import pytest
 from rich.console import Console
 
 from socialai_dsl.cli import evaluate as evaluate_command
-from socialai_dsl.cli import run as run_command
 from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import clock
 from socialai_dsl.cli.main import main
@@ -18,8 +17,9 @@ from socialai_dsl.experiments import estimate
 from socialai_dsl.experiments.document import document_of
 from socialai_dsl.experiments.folder import PlannedRun, runs_of
 from socialai_dsl.experiments.work import _Work
-from socialai_dsl.frontend import load_experiment
+from socialai_dsl.frontend import load, load_experiment
 from socialai_dsl.runs.lock import Holder
+from socialai_dsl.runs.options import new_config
 from socialai_dsl.runs.status import Status
 
 Capture = pytest.CaptureFixture[str]
@@ -209,7 +209,7 @@ def test_failures_stay_in_sight(tmp_path: Path) -> None:
     assert "1 failed, 39 done, 0 at work, 0 waiting" in lines[-1]
 
 
-def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
+def test_what_a_run_is_asked_for_is_what_the_commands_take(file: Path) -> None:
     """Whatever a condition can say, `socialai run` and `socialai evaluate` understand."""
     options = (
         "net: fast, bonus: cell, envs: 64, curriculum: expert, precision: bfloat16, device: cpu, threads: 2, "
@@ -222,15 +222,15 @@ def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
     document = document_of(load_experiment(file), None)
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
-    run_command.add_arguments(commands.add_parser("run"))
     evaluate_command.add_arguments(commands.add_parser("evaluate"))
-    learns, chance = (_Work(run, lambda: False) for run in runs_of(file.parent, document))
-    given = parser.parse_args(learns._run_command())
-    for name, value in document["conditions"][0]["options"].items():
-        words = [f"{key}={each}" for key, each in value.items()] if name == "hyper" else value
-        assert getattr(given, name) == words
-    assert (given.scenario, given.agent, given.seed, given.frames) == ("social_env", "ppo", 5, 1000)
-    assert parser.parse_args(chance._run_command()).seed == 5
+    runs = runs_of(file.parent, document)
+    given, by_chance = (dict(run.options) for run in runs)
+    named = {"scenario": "social_env", "agent": "ppo", "seed": 5, "frames": 1000, "bonus_c": 3.0}
+    options = {k: v for k, v in document["conditions"][0]["options"].items() if k != "hyper"}
+    assert given == options | named
+    assert new_config(given.pop("scenario"), given, load("social_env")).envs == 64
+    assert by_chance == {"scenario": "social_env", "agent": "random", "seed": 5, "eval_episodes": 30}
+    learns, chance = (_Work(run, lambda: False) for run in runs)
     own = str(file.parent / "runs" / document["runs"][0]["id"])
     for work, agent, seed in ((learns, own, None), (chance, "random", 5)):
         asked = parser.parse_args(work._test_command(["help", "dance"]))

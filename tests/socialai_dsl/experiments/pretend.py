@@ -18,22 +18,17 @@ FRAMES_OF_AN_UPDATE = 100
 
 def run(words: list[str]) -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("scenario", nargs="?")
-    for option in ("out", "resume"):
+    for option in ("out", "resume", "config"):
         parser.add_argument(f"--{option}", type=Path)
-    for option in ("frames", "seed", "checkpoint-every", "envs"):
-        parser.add_argument(f"--{option}", type=int, default=0)
-    parser.add_argument("--agent", default="ppo")
-    given, _ = parser.parse_known_args(words)
+    parser.add_argument("--json", action="store_true")
+    given = parser.parse_args(words)
     folder = given.resume or given.out
     folder.mkdir(parents=True, exist_ok=True)
     config = folder / "config.json"
     if given.out:
         assert not config.exists(), "--out: the folder holds a run already"
-        settings = {
-            k: getattr(given, k) for k in ("scenario", "frames", "seed", "agent", "checkpoint_every", "envs")
-        }
-        config.write_text(json.dumps(settings))
+        asked = {"frames": 0, "checkpoint_every": 0, "envs": 0} | json.loads(given.config.read_text())
+        config.write_text(json.dumps(asked))
     settings = json.loads(config.read_text())
     if settings["envs"] == 13:
         print("thirteen environments bring bad luck", file=sys.stderr)

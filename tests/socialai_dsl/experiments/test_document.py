@@ -10,7 +10,6 @@ import pytest
 
 from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.document import completed, config_of, differences, document_of
 from socialai_dsl.frontend import load, load_experiment
 from socialai_dsl.schema.experiment import NETS, Hyper, Settings
@@ -253,16 +252,6 @@ conditions:
     a, b = (condition["options"]["hyper"] for condition in document["conditions"])
     assert a == {"lr": 0.001, "clip": 0.1}
     assert b == {"lr": 0.01, "clip": 0.1, "loss": "per_head"}
-
-
-def test_settings_are_typed_as_options():
-    assert typed("checkpoint_every", 3) == ["--checkpoint-every", "3"]
-    assert typed("json", True) == ["--json"]
-    assert typed("hyper", {"lr": 1e-4, "loss": "per_head", "clip_value": True}) == [
-        *("--hyper", "lr=0.0001"),
-        *("--hyper", "loss=per_head"),
-        *("--hyper", "clip_value=true"),
-    ]
 
 
 def test_the_networks_are_those_of_the_trainer():
