@@ -47,7 +47,7 @@ class PlannedRun(Run):
         if condition["frames"] is not None:
             options["frames"] = condition["frames"]
         named = {"scenario": condition["scenario"], "agent": condition["agent"], "seed": self.seed}
-        return named | options | condition["options"].get("hyper", {})
+        return {**named, **options, **condition["options"].get("hyper", {})}
 
     @property
     def missing_tests(self) -> list[str]:

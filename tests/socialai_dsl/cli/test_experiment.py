@@ -225,7 +225,7 @@ def test_what_a_run_is_asked_for_is_what_the_commands_take(file: Path) -> None:
     evaluate_command.add_arguments(commands.add_parser("evaluate"))
     runs = runs_of(file.parent, document)
     given, by_chance = (dict(run.options) for run in runs)
-    named = {"scenario": "social_env", "agent": "ppo", "seed": 5, "frames": 1000, "bonus_c": 3.0}
+    named = {"scenario": "social_env", "agent": "ppo", "seed": 5, "frames": 1000, "bonus_c": 2.0}
     options = {k: v for k, v in document["conditions"][0]["options"].items() if k != "hyper"}
     assert given == options | named
     assert new_config(given.pop("scenario"), given, load("social_env")).envs == 64
