@@ -6,6 +6,7 @@ The public surface, imported on first use so that checking a file loads neither 
 * `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map; of a suite a `ProgramSuite`.
 * `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
+* `train(name, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
 """
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load, load_curriculum
     from socialai_dsl.program import Program
     from socialai_dsl.program_suite import ProgramSuite
+    from socialai_dsl.runs.folder import Run
+    from socialai_dsl.runs.train import Progress, resume, train
 
 __version__ = "0.1.0"
 
@@ -37,6 +40,10 @@ _HOME = {
     "ProgramSuite": ("socialai_dsl.program_suite", "ProgramSuite"),
     "make": ("socialai_dsl.envs", "make"),
     "make_vec": ("socialai_dsl.envs", "make_vec"),
+    "train": ("socialai_dsl.runs.train", "train"),
+    "resume": ("socialai_dsl.runs.train", "resume"),
+    "Run": ("socialai_dsl.runs.folder", "Run"),
+    "Progress": ("socialai_dsl.runs.train", "Progress"),
     "ScenarioEnv": ("socialai_dsl.envs", "ScenarioEnv"),
     "ScenarioVectorEnv": ("socialai_dsl.envs", "ScenarioVectorEnv"),
     "ScenarioError": ("socialai_dsl.diagnostics", "ScenarioError"),
@@ -49,6 +56,8 @@ __all__ = [
     "LoadedSuite",
     "Program",
     "ProgramSuite",
+    "Progress",
+    "Run",
     "ScenarioEnv",
     "ScenarioError",
     "ScenarioVectorEnv",
@@ -57,6 +66,8 @@ __all__ = [
     "load_curriculum",
     "make",
     "make_vec",
+    "resume",
+    "train",
 ]
 
 

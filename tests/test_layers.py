@@ -126,7 +126,9 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "_gymnasium_hook": ({"envs"}, set()),
     "__main__": ({"cli"}, set()),
     "": (
-        TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "envs", "_gymnasium_hook"},
+        TEXT_SIDE
+        | {"program", "program_suite", "compilation", "engine", "envs", "_gymnasium_hook"}
+        | {"runs", "runs.folder"},
         set(),
     ),
 }

@@ -12,7 +12,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from socialai_dsl.cli import former
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, printable, render_text, suggested
@@ -37,16 +36,7 @@ _COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
-    typed = sys.argv[1:] if argv is None else argv
-    words, advice = former.current(typed)
-    if advice is not None:
-        print(
-            f"socialai: {printable(typed[0])}: write {advice}; this still works in this version",
-            file=sys.stderr,
-        )
-    if words and words[0] in former.FOR_MAINTAINERS:
-        print(f"socialai: {words[0]} is for maintainers: `make {words[0]}` in a checkout", file=sys.stderr)
-        return Exit.USAGE
+    words = sys.argv[1:] if argv is None else argv
     # Loading all commands doubles the time to start; the others are needed for their summaries alone.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
     modules = {name: import_module(f"socialai_dsl.cli.{name}") for name in named}

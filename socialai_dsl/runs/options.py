@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, Final
 
 import yaml
@@ -14,7 +15,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import OptionError, first_mistake
 from socialai_dsl.frontend import closest_script, load_curriculum
-from trainer.config import FLAGS, HYPER, NET_PRESETS, UNTRAINED, RunConfig, configure
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, UNTRAINED, RunConfig, configure
 
 AUTOMATIC: Final[Mapping[str, str]] = {
     "device": "a graphics card where there is one",
@@ -182,11 +183,19 @@ def _resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:
 # -- what is refused ----------------------------------------------------------------------------------------------
 
 
-def _refuse_unknown(options: Iterable[str]) -> None:
-    for name in options:
+def _refuse_unknown(options: Mapping[str, Any]) -> None:
+    """Refuse names and values that are none, of whatever type; bounds are `RunConfig`'s to say."""
+    for name, value in options.items():
         if name not in OPTIONS:
             hint = suggested(name, OPTIONS, f"; expected one of {', '.join(OPTIONS)}")
             raise OptionError(name, f"there is no such option{hint}")
+        if not isinstance(value, bool | int | float | str | None):
+            raise OptionError(
+                name, f"got {shortened(value)}, expected a number, a word, a truth value or nothing"
+            )
+    recipe = options.get("recipe")
+    if recipe is not None and recipe not in RECIPES:
+        raise OptionError("recipe", f"got {recipe!r}, expected one of {', '.join(RECIPES)}")
 
 
 def _refuse_idle(given: Iterable[str], config: RunConfig) -> None:

@@ -1,0 +1,106 @@
+"""Runs in Python: what `socialai-run` does, without a word."""
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.errors import UsageError
+
+WILD = '{"scenario": "help", "net": []}'
+QUICK: dict[str, Any] = {
+    "frames": 512,
+    "envs": 8,
+    "eval_episodes": 8,
+    "threads": 1,
+    "device": "cpu",
+    "seed": 3,
+}
+
+
+def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is told of before and after each update; its folder has everything; more frames make it longer."""
+    seen: list[sd.Progress] = []
+    run = sd.train("help", out=tmp_path / "run", recipe="plain", horizon=32, progress=seen.append, **QUICK)
+    assert [(one.frames, one.total) for one in seen] == [(0, 512), (256, 512), (512, 512)]
+    assert {one.run for one in seen} == {run} == {sd.Run(tmp_path / "run")}
+    assert run.result == json.loads((run.folder / "result.json").read_text())
+    assert (run.config.frames, run.config.lr, run.checkpoint_frames) == (512, 7e-4, 512)
+    assert run.agent == str(run.folder)
+    longer = sd.resume(run.folder, frames=768)
+    assert longer == run
+    assert longer.result is not None
+    assert longer.result["frames"] == 768
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_agent_that_is_not_trained(tmp_path: Path) -> None:
+    run = sd.train("help", out=tmp_path / "run", agent="oracle", eval_episodes=5)
+    assert (run.agent, run.checkpoint_frames) == ("oracle", None)
+    assert run.result is not None
+    assert run.result["eval"]["success_rate"] == 1
+    with pytest.raises(ValueError, match=r"resume: the agent 'oracle' of .* is not trained"):
+        sd.resume(run.folder)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"fames": 5}, "fames: there is no such option; did you mean frames"),
+        ({"frames": "many"}, "frames: expected a valid integer, got 'many'"),
+        ({"lr": -1.0}, "lr: expected more than 0, got -1.0"),
+        ({"device": "tpu"}, "device: got 'tpu', expected auto, cpu or cuda"),
+        ({"agent": "nobody"}, "agent: expected ppo, random, oracle, human, shipped or"),
+        ({"agent": "random", "frames": 10}, "frames: the agent 'random' is not trained"),
+        ({"recipe": "plain", "guide_share": 0.2}, "guide_share: it is for a guide, and this run has none"),
+        ({"recipe": "wild"}, "recipe: got 'wild', expected one of plain"),
+    ],
+)
+def test_an_option_that_is_wrong_is_named_and_no_folder_made(
+    options: dict[str, Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=said):
+        sd.train("help", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_holds_a_run(tmp_path: Path) -> None:
+    sd.train("help", out=tmp_path / "run", agent="random", eval_episodes=1)
+    with pytest.raises(UsageError, match=r"out: .* holds a run already; resume it, or choose another folder"):
+        sd.train("help", out=tmp_path / "run", agent="random", eval_episodes=1)
+    with pytest.raises(UsageError, match=r"resume: .*nowhere is not a run's folder"):
+        sd.resume(tmp_path / "nowhere")
+
+
+def test_a_thread_of_its_own(tmp_path: Path) -> None:
+    """Only the main thread may ask for signals."""
+    options = {**QUICK, "frames": 256, "recipe": "plain", "out": tmp_path / "run"}
+    thread = threading.Thread(target=sd.train, args=("help",), kwargs=options)
+    thread.start()
+    thread.join(120)
+    assert sd.Run(tmp_path / "run").result is not None
+
+
+def test_options_in_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from socialai_dsl.cli.main import run_main
+
+    file = tmp_path / "options.json"
+    file.write_text(json.dumps({"scenario": "help", "agent": "random", "seed": 4, "eval_episodes": 3}))
+    assert run_main(["--config", str(file), "--out", str(tmp_path / "run"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["scenario"], result["seed"], result["eval"]["episodes"]) == ("help", 4, 3)
+    assert run_main(["--config", str(file), "--seed", "5"]) == 2
+    assert "--config: the file says all options" in capsys.readouterr().err
+    for text, said in (
+        ("[]", "expected a JSON object"),
+        ("{", "expected JSON"),
+        ("{}", "expected a scenario"),
+        (WILD, "--net: got [], expected a number"),
+    ):
+        file.write_text(text)
+        assert run_main(["--config", str(file)]) == 2
+        assert said in capsys.readouterr().err
