@@ -6,7 +6,9 @@ The public surface, imported on first use so that checking a file loads neither 
 * `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map; of a suite a `ProgramSuite`.
 * `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
-* `train(name, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
+* `train(scenario, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
+* `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)` and `trace(scenario)` do what the commands do,
+  with every kind of agent, and return objects.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
 """
@@ -22,10 +24,14 @@ if TYPE_CHECKING:
     from socialai_dsl.compilation import compile_loaded as compile
     from socialai_dsl.diagnostics import Diagnostic, ScenarioError
     from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_vec
+    from socialai_dsl.episodes.traces import trace
     from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load, load_curriculum
     from socialai_dsl.program import Program
     from socialai_dsl.program_suite import ProgramSuite
+    from socialai_dsl.runs.evaluate import evaluate
     from socialai_dsl.runs.folder import Run
+    from socialai_dsl.runs.recordings import record
+    from socialai_dsl.runs.replay import replay
     from socialai_dsl.runs.train import Progress, resume, train
 
 __version__ = "0.1.0"
@@ -46,6 +52,10 @@ _HOME = {
     "Progress": ("socialai_dsl.runs.train", "Progress"),
     "ScenarioEnv": ("socialai_dsl.envs", "ScenarioEnv"),
     "ScenarioVectorEnv": ("socialai_dsl.envs", "ScenarioVectorEnv"),
+    "evaluate": ("socialai_dsl.runs.evaluate", "evaluate"),
+    "record": ("socialai_dsl.runs.recordings", "record"),
+    "replay": ("socialai_dsl.runs.replay", "replay"),
+    "trace": ("socialai_dsl.episodes.traces", "trace"),
     "ScenarioError": ("socialai_dsl.diagnostics", "ScenarioError"),
     "Diagnostic": ("socialai_dsl.diagnostics", "Diagnostic"),
 }
@@ -62,11 +72,15 @@ __all__ = [
     "ScenarioError",
     "ScenarioVectorEnv",
     "compile",
+    "evaluate",
     "load",
     "load_curriculum",
     "make",
     "make_vec",
+    "record",
+    "replay",
     "resume",
+    "trace",
     "train",
 ]
 

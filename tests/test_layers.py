@@ -127,8 +127,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "__main__": ({"cli"}, set()),
     "": (
         TEXT_SIDE
-        | {"program", "program_suite", "compilation", "engine", "envs", "_gymnasium_hook"}
-        | {"runs", "runs.folder"},
+        | {"program", "program_suite", "compilation", "engine", "envs", "episodes", "runs", "runs.folder"}
+        | {"_gymnasium_hook"},
         set(),
     ),
 }

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
+from socialai_dsl import evaluate
 from socialai_dsl.episodes.players import Player
-from socialai_dsl.evaluation.test_set import evaluate
 from trainer.config import RunConfig
 from trainer.ppo import train
 

@@ -42,8 +42,9 @@ from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.test_set import Evaluation, evaluate
+from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.runs.copies import MovedScenario
+from socialai_dsl.runs.evaluate import evaluate
 from socialai_dsl.runs.export import finished_agent, write_agent
 from socialai_dsl.runs.folder import CONFIG, RESULT
 from trainer import checkpoint as checkpoints

@@ -2,7 +2,7 @@
 
 import argparse
 from dataclasses import fields
-from typing import Final
+from typing import Any, Final
 
 from socialai_dsl.cli.arguments import STYLE, at_once, number_between, positive, seconds
 from socialai_dsl.episodes.players import ModelOptions
@@ -88,11 +88,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def model_options(arguments: argparse.Namespace) -> ModelOptions:
-    """What was typed, as the evaluation takes it."""
+def model_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What was typed of `ModelOptions`."""
     if arguments.grammar and arguments.mode not in (None, "text"):
         raise UsageError(
             f"--grammar: replies of --mode {arguments.mode} have a form already; it is for --mode text"
         )
     given = {name: getattr(arguments, name) for name in MODEL_OPTIONS}
-    return ModelOptions(**{name: value for name, value in given.items() if value is not None})
+    return {name: value for name, value in given.items() if value is not None}

@@ -113,6 +113,20 @@ class Player:
         return self.policy is None and self.agent.startswith(MODEL_PREFIX)
 
     @property
+    def is_person(self) -> bool:
+        """Whether a person plays."""
+        return self.policy is None and self.agent == "human"
+
+    @property
+    def kind(self) -> str:
+        """What kind of mind plays: chance, script, person, model, network, or a policy of somebody's own."""
+        if self.policy is not None:
+            return "policy"
+        if self.is_model:
+            return "model"
+        return {"random": "chance", "oracle": "script", "human": "person"}.get(self.agent, "network")
+
+    @property
     def is_script(self) -> bool:
         """Whether the scenario's own script plays."""
         return self.policy is None and self.agent == "oracle"

@@ -2,9 +2,8 @@
 
 The page `docs/evaluation.md` shows each of these at work:
 
-* `evaluate(agent, scenario)`: the test set, as `socialai evaluate` plays it; `evaluate_policy(policy, envs, episodes)`
-  does so for a policy and environments of one's own.
-* `record(evaluation, folder)`: films, transcripts and a page that replays episodes.
+* `evaluate_policy(policy, envs, episodes)`: the test set, for a policy and environments of one's own;
+  `socialai_dsl.evaluate` plays it with every kind of agent, and returns an `Evaluation`.
 * `coverage(scenarios)`: how often each rule, state, step and outcome came about, and what never did.
 * `baselines(scenario)`: what success is set beside; `play_script` and `play_at_random` measure more closely.
 
@@ -17,9 +16,8 @@ from socialai_dsl.episodes.results import EvalResult, wilson_interval
 from socialai_dsl.evaluation.chance import Sample, play_at_random
 from socialai_dsl.evaluation.coverage_report import Coverage, coverage
 from socialai_dsl.evaluation.levels import baselines
-from socialai_dsl.evaluation.recordings import record
 from socialai_dsl.evaluation.scripts import ScriptReport, play_script
-from socialai_dsl.evaluation.test_set import Evaluation, evaluate, evaluate_policy
+from socialai_dsl.evaluation.test_set import Evaluation, evaluate_policy
 
 __all__ = [
     "Baselines",
@@ -33,10 +31,8 @@ __all__ = [
     "ScriptReport",
     "baselines",
     "coverage",
-    "evaluate",
     "evaluate_policy",
     "play_at_random",
     "play_script",
-    "record",
     "wilson_interval",
 ]

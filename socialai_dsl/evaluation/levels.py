@@ -17,7 +17,7 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.test_set import evaluate
+from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.frontend import load
 
 
@@ -84,7 +84,8 @@ def _digest(scenario: str) -> str:
 
 
 def _played(scenario: str, agent: str, episodes: int) -> Level:
-    result = evaluate(Player(agent), scenario, episodes).result
+    loaded = load(scenario)
+    result = play_test_set(Player(agent), scenario, loaded, compile_loaded(loaded), episodes).result
     return Level(result.success_rate, result.success_rate_se, f"{episodes} test episodes")
 
 

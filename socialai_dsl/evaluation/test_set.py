@@ -1,6 +1,6 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.atomic import read_json
-from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.factory import compiled, make, make_vec
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
-from socialai_dsl.episodes.players import Player, folder_of, make_policy, player_of, require_trainer
+from socialai_dsl.episodes.players import Player, make_policy, require_trainer
 from socialai_dsl.episodes.policies import Policy
 from socialai_dsl.episodes.results import Actions, EvalResult, Results
 from socialai_dsl.episodes.scripts import with_script
@@ -29,8 +27,7 @@ from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 from socialai_dsl.replay import Thought, Trace
 from socialai_dsl.replay.document import Outcome
 from socialai_dsl.replay.endings import Ending, endings_of, short_name
-from socialai_dsl.runs.folder import CONFIG, scenario_folder_name
-from trainer.config import scenario_in
+from socialai_dsl.runs.folder import scenario_folder_name
 
 if TYPE_CHECKING:  # it needs Textual
     from socialai_dsl.play.game import FinishedEpisode
@@ -52,6 +49,7 @@ class Evaluation:
         warnings: what the agent's checkpoint does not know of this scenario, and the like.
         more: figures that count for this agent alone.
         replies: of a language model, what it answered before each action of each episode.
+        folder: where it is kept, if it is. kept: the name that the scenario has there.
     """
 
     scenario: str
@@ -64,6 +62,8 @@ class Evaluation:
     warnings: Sequence[str] = field(default_factory=tuple)
     more: Mapping[str, Any] = field(default_factory=dict)
     replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
+    folder: Path | None = None
+    kept: str | None = None
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
@@ -160,37 +160,24 @@ def _thinking(policy: Any, number: int) -> Think:
     return think
 
 
-def evaluate(
-    agent: str | Path | Player | Policy | Callable[[Any], Any], scenario: str, episodes: int = 500
+def play_test_set(
+    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
     Args:
-        agent: `random`, `oracle` (the scenario's own script), `human`, `llm:MODEL`, `shipped`, `shipped:NAME`, or the
-            path of a run or of a checkpoint; as a `Player` with a device, a seed, options and the like; or a policy of
-            your own, see `Policy`, or a function from observations to actions.
-        scenario: a path or a name, with `+variants` and `?parameters`.
-        episodes: how many. Rooms are the same for every agent, on every machine.
+        player: who plays, and how.
+        scenario: as it was asked for.
+        loaded: the same.
+        program: the same, compiled.
+        episodes: how many.
 
     Raises:
-        ScenarioError: the scenario has mistakes.
-        UsageError: the checkpoint or the script does not fit it, or a language model does not answer.
+        UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
         RunFailed: a language model has spent its budget.
-        ValueError: an argument is not what is expected.
     """
-    if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
-        raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
-    player = player_of(agent, scenario)
-    loaded = load(scenario)
-    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
-
-
-def play_test_set(
-    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int
-) -> Evaluation:
-    """`evaluate` of a scenario that is loaded and compiled."""
     endings = endings_of(loaded, program)
-    if player.agent == "human" and player.policy is None:
+    if player.is_person:
         person = _let_a_person_play(player.kept_in, scenario, program, episodes)
         return _of_person(person, scenario, loaded, program, player)
     if player.is_model:
@@ -339,18 +326,3 @@ def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]
         won = sum(shares[name] for name in names & successes)
         members[member] = {"share": share, "success_rate": won / share if share else None}
     return {"members": members}
-
-
-def own_scenario(agent: str) -> str:
-    """The scenario on which the agent of a run's folder, or one that ships, was trained.
-
-    Raises:
-        UsageError: it is neither.
-    """
-    run = folder_of(agent)
-    if not (run / CONFIG).is_file():
-        raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
-    scenario = read_json(run / CONFIG).get("scenario")
-    if not isinstance(scenario, str):
-        raise UsageError(f"{run / CONFIG}: scenario: expected a text, got {scenario!r}")
-    return scenario_in(run, scenario)

@@ -39,6 +39,8 @@ FAILURE: Final = "failure"
 """The name of film and transcript of a failure, without their endings."""
 
 EPISODES: Final = "episodes.csv"
+EVALUATIONS: Final = "evaluation.json"
+"""The results on several scenarios, in the folder above those of the scenarios."""
 TESTS: Final = "tests.json"
 STATUS: Final = "status.json"
 CANCEL: Final = "cancel"

@@ -7,7 +7,7 @@ import shutil
 import traceback
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,6 +23,7 @@ from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.replay.endings import endings_of, short_name
 from socialai_dsl.runs.copies import keep_run
+from socialai_dsl.runs.evaluate import result_of
 from socialai_dsl.runs.folder import (
     CHECKPOINTS,
     CONFIG,
@@ -37,7 +38,6 @@ from socialai_dsl.runs.learnt import Learnt
 from socialai_dsl.runs.options import continued_config, new_config
 from socialai_dsl.runs.outputs import draw_curve, record_run, training_figures, write_card
 from socialai_dsl.runs.stopping import Stop
-from socialai_dsl.runs.versions import versions
 from trainer.config import UNTRAINED, RunConfig
 from trainer.files import checkpoint_files
 
@@ -171,19 +171,13 @@ def _perform(
     # What is trained differs by its training; what is not, by what it draws.
     drawn = 0 if config.trains else config.seed
     player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder, out=folder)
-    evaluation = play_test_set(player, config.played, loaded, program, config.eval_episodes)
+    played = play_test_set(player, config.played, loaded, program, config.eval_episodes)
+    evaluation = replace(played, folder=folder, kept=config.scenario)
     for warning in evaluation.warnings:
         warnings.warn(warning, stacklevel=3)
-    result = {
-        "scenario": config.scenario,
-        "agent": short_name(config.agent),
-        "seed": config.seed,
-        **({"recipe": config.recipe, "guide": config.guide} if config.trains else {}),
-        **training,
-        "eval": evaluation.figures(),
-        "program_sha256": program.sha256,
-        "versions": versions(),
-    }
+    told = {"recipe": config.recipe, "guide": config.guide} if config.trains else {}
+    result = result_of(evaluation, **told, **training)
+    result |= {"agent": short_name(config.agent), "seed": config.seed}  # of the training, if there was one
     record_run(evaluation, folder, f"agent {short_name(config.agent)}, seed {config.seed}")
     if config.trains:
         draw_curve(config, folder, result)

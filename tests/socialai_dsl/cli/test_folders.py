@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from socialai_dsl import evaluate, record, trace
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.episodes import EvalResult, Player, RandomPolicy, trace
-from socialai_dsl.evaluation import evaluate, record
+from socialai_dsl.episodes import EvalResult, Player, RandomPolicy
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.runs import folder as run_folder
 from socialai_dsl.runs.folder import only_writer

@@ -1,0 +1,192 @@
+"""Plays the test set with an agent, and leaves a folder of results if one is named."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+from socialai_dsl.atomic import read_json, write_json
+from socialai_dsl.baselines import MOST_EPISODES
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.envs.options import refuse_unknown
+from socialai_dsl.episodes.players import (
+    HUMAN_FOLDER,
+    Agent,
+    ModelOptions,
+    Player,
+    folder_of,
+    named_agent,
+    player_of,
+    require_trainer,
+    session_folder,
+)
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
+from socialai_dsl.frontend import load
+from socialai_dsl.replay.endings import short_name
+from socialai_dsl.runs.copies import keep_scenario
+from socialai_dsl.runs.folder import CONFIG, EVALUATIONS, RESULT, only_writer, scenario_folder_name
+from socialai_dsl.runs.options import resolved_device
+from socialai_dsl.runs.recordings import write_recordings
+from socialai_dsl.runs.versions import versions
+from trainer.config import RunConfig, scenario_in
+
+_PLAYER: Final = ("greedy", "seed", "device", "net")
+_MODEL: Final = tuple(field.name for field in fields(ModelOptions))
+RECORDED: Final = 3
+"""The number of successes, and of failures, that an evaluation films."""
+
+
+def evaluate(
+    agent: Agent,
+    scenario: str | Path | None = None,
+    episodes: int = 500,
+    *,
+    out: str | Path | None = None,
+    record: int = RECORDED,
+    **options: Any,
+) -> Evaluation:
+    """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
+
+    Args:
+        agent: `random`, `oracle` (the scenario's own script), `human`, `llm:MODEL`, `shipped`, `shipped:NAME`, or the
+            path of a run or of a checkpoint; a `Player`; or a policy of your own, see `Policy`, a model of
+            Stable-Baselines3, or a function from observations to actions.
+        scenario: a path or a name, with `+variants` and `?parameters`; None: that of the run.
+        episodes: how many. Rooms are the same for every agent, on every machine.
+        out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
+            episodes and a list of all; reports take it. A language model and a person have one in any case.
+        record: up to how many successes, and how many failures, are filmed there.
+        options: of a trained agent `greedy`, `seed`, `device` and `net`, of `random` the `seed`; of a language model
+            those of `ModelOptions`.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: the checkpoint or the script does not fit it, or a language model does not answer.
+        RunFailed: a language model has spent its budget.
+        ValueError: an argument is not what is expected.
+        OSError: a file cannot be written.
+    """
+    named = [] if scenario is None else [str(scenario)]
+    player = made_player(agent, named, options, None if out is None else Path(out))
+    return next(evaluate_each(player, named, episodes, record, None if out is None else Path(out)))
+
+
+def evaluate_each(
+    player: Player, scenarios: Sequence[str], episodes: int, record: int = RECORDED, out: Path | None = None
+) -> Iterator[Evaluation]:
+    """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
+    if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
+        raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
+    folder = player.kept_in if player.is_model or player.is_person else out
+    results = []
+    # Every session of a person has a folder of its own, which nobody else knows of.
+    with contextlib.nullcontext() if folder is None or player.is_person else only_writer(folder):
+        for scenario in scenarios or [own_scenario(player.agent)]:
+            evaluation = _evaluated(player, scenario, episodes, record, folder)
+            results.append(result_of(evaluation))
+            if folder is not None:
+                # After each scenario, so that nothing is lost should the agent not fit the next one.
+                write_json(folder / EVALUATIONS, results)
+            yield evaluation
+
+
+def _evaluated(player: Player, scenario: str, episodes: int, record: int, out: Path | None) -> Evaluation:
+    playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
+    loaded = load(scenario)
+    if out is None:
+        return play_test_set(playing, scenario, loaded, compiled(loaded), episodes)
+    place = out / scenario_folder_name(scenario)
+    place.mkdir(parents=True, exist_ok=True)
+    kept = keep_scenario(place, scenario, loaded).scenario
+    # As a run that trained nothing, so that reports take it as one.
+    write_json(place / CONFIG, {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed})
+    evaluation = replace(
+        play_test_set(playing, scenario, loaded, compiled(loaded), episodes), folder=place, kept=kept
+    )
+    write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
+    write_json(place / RESULT, result_of(evaluation))
+    return evaluation
+
+
+def made_player(
+    agent: Agent,
+    scenarios: Sequence[str],
+    options: Mapping[str, Any],
+    out: Path | None,
+    who: str | None = None,
+) -> Player:
+    """Who plays, and how.
+
+    Args:
+        agent: see `evaluate`.
+        scenarios: what is played; of none, that of the agent's run.
+        options: see `evaluate`.
+        out: where what a language model or a person plays is kept.
+        who: begins the name of the folder of a person's session.
+
+    Raises:
+        ValueError: an option that this agent does not have; or see `evaluate`.
+    """
+    if isinstance(agent, Player):
+        refuse_unknown("evaluate", options, (), "; a Player has them itself")
+        return agent
+    if not isinstance(agent, str | Path):
+        refuse_unknown("evaluate", options, (), "; what you hand over plays as it is")
+        return player_of(agent, scenarios[0] if scenarios else "")
+    player = Player(str(agent), out=out)
+    known = _MODEL if player.is_model else {"random": ("seed",)}.get(player.agent, ())
+    known = _PLAYER if player.is_trained else known
+    refuse_unknown(f"the agent {player.agent!r}", {k: v for k, v in options.items() if k not in known}, known)
+    if player.is_model:
+        return replace(player, options=ModelOptions(**options))
+    if player.is_person:
+        return replace(player, out=session_folder(out or HUMAN_FOLDER, who))
+    if not player.is_trained:
+        return replace(player, **options)
+    require_trainer()
+    has_own = not scenarios or (folder_of(player.agent) / CONFIG).is_file()
+    own = RunConfig(scenario=own_scenario(player.agent) if has_own else scenarios[0])
+    folder = own.within(folder_of(player.agent) if has_own else Path()).code_folder
+    device = resolved_device(options.get("device", "auto"))
+    return replace(player, folder=folder, **{**options, "device": device})
+
+
+def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
+    """What stands in `result.json`, in one form for all players.
+
+    Args:
+        evaluation: what was played.
+        more: further keys, such as the figures of training.
+    """
+    player = evaluation.player
+    return {
+        "scenario": evaluation.kept or evaluation.scenario,
+        "agent": short_name(player.agent),
+        "kind": player.kind,
+        "greedy": player.greedy,
+        "seed": player.seed,
+        **more,
+        "warnings": list(evaluation.warnings),
+        "eval": evaluation.figures(),
+        "program_sha256": evaluation.program.sha256,
+        "versions": versions(),
+    }
+
+
+def own_scenario(agent: str) -> str:
+    """The scenario on which the agent of a run's folder, or one that ships, was trained.
+
+    Raises:
+        UsageError: it is neither.
+    """
+    run = folder_of(agent)
+    if not (run / CONFIG).is_file():
+        raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
+    scenario = read_json(run / CONFIG).get("scenario")
+    if not isinstance(scenario, str):
+        raise UsageError(f"{run / CONFIG}: scenario: expected a text, got {scenario!r}")
+    return scenario_in(run, scenario)

@@ -1,0 +1,155 @@
+"""Episodes to watch again: of a run, of a scenario, or from a file of traces."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+from pydantic import TypeAdapter, ValidationError
+
+from socialai_dsl.atomic import read_json, write_text
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.episodes.players import Agent, Player, folder_of, player_of
+from socialai_dsl.episodes.scripts import script_of
+from socialai_dsl.errors import OptionError, UsageError, first_mistake
+from socialai_dsl.evaluation.test_set import (
+    Evaluation,
+    evaluation_of_model,
+    evaluation_of_person,
+    play_test_set,
+)
+from socialai_dsl.frontend import load
+from socialai_dsl.replay import Trace
+from socialai_dsl.replay.page import replay_page
+from socialai_dsl.runs.evaluate import made_player, own_scenario
+from socialai_dsl.runs.folder import CONFIG
+
+REPLAYED: Final = 5
+"""The number of successes, and of failures, that are kept."""
+PLAYED: Final = 100
+"""The number of test episodes of which these are."""
+_ENDINGS: Final = (".html", ".json")
+
+
+def replay(
+    source: str | Path,
+    out: str | Path | None = None,
+    *,
+    agent: Agent | None = None,
+    episodes: int | None = None,
+    record: int | None = None,
+    test_episodes: Iterable[int] | None = None,
+    greedy: bool = False,
+) -> list[Trace]:
+    """Trace test episodes step by step, with rules and reasons, as `socialai replay` does.
+
+    Args:
+        source: the folder of a run or of an evaluation, `shipped:NAME`, the path or name of a scenario, or a file of
+            traces, which ends in `.json`.
+        out: a file that ends in `.html` gets a page to watch them, one that ends in `.json` the traces; None: neither.
+        agent: who plays a scenario, as for `evaluate` (default: its script if it has one, else `random`).
+        episodes: how many test episodes are played (default: 100).
+        record: up to how many successes, and how many failures, are kept (default: 5).
+        test_episodes: numbers of test episodes, which are kept instead.
+        greedy: whether a trained agent takes its most probable action.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: an option does not go with the source, or an agent does not fit (a ValueError).
+        OSError: a file cannot be read or written.
+    """
+    place = None if out is None else Path(out)
+    if place is not None and place.suffix not in _ENDINGS:
+        raise OptionError("out", f"got {place}, expected a name that ends in {' or '.join(_ENDINGS)}")
+    if str(source).endswith(".json"):
+        given = {"agent": agent, "episodes": episodes, "record": record, "test_episode": test_episodes}
+        for name in [*(name for name, value in given.items() if value is not None), *["greedy"] * greedy]:
+            raise OptionError(name, f"{source} holds episodes that were played already")
+        traces = _read(Path(source))
+    else:
+        numbers = None if test_episodes is None else list(dict.fromkeys(test_episodes))
+        if numbers is not None and (episodes is not None or record is not None):
+            name = "record" if episodes is None else "episodes"
+            raise OptionError(name, "--test-episode says which episodes are played and kept")
+        count = (episodes or PLAYED) if numbers is None else max(numbers) + 1
+        traces = _played(_evaluation(str(source), agent, count, greedy), record or REPLAYED, numbers)
+    if place is not None:
+        written = place.suffix == ".json"
+        whole = (
+            "[" + ",\n".join(trace.as_json() for trace in traces) + "]\n" if written else replay_page(traces)
+        )
+        write_text(place, whole)
+    return traces
+
+
+def _read(path: Path) -> list[Trace]:
+    """Traces from a file.
+
+    Raises:
+        OSError: it cannot be read.
+        UsageError: it holds something else.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        traces = TypeAdapter(list[Trace]).validate_python([found] if isinstance(found, dict) else found)
+    except ValidationError as error:
+        place, said = first_mistake(error.errors())
+        raise UsageError(f"{path}: {place or 'the file'}: {said}") from None
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{path}: expected a JSON list of traces, {error}") from None
+    if not all(trace.moments for trace in traces) or not traces:
+        raise UsageError(f"{path}: expected at least one trace, each with a moment")
+    return traces
+
+
+def _played(evaluation: Evaluation, record: int, numbers: Sequence[int] | None) -> list[Trace]:
+    """Those episodes that were asked for, or successes and failures."""
+    for warning in evaluation.warnings:
+        warnings.warn(warning, stacklevel=3)
+    if numbers is None:
+        return evaluation.traces(evaluation.to_replay(record))
+    for number in numbers:
+        if number not in evaluation.actions:
+            raise OptionError(
+                "test_episode",
+                f"got {number}, expected less than {len(evaluation.actions)}, as many as were played",
+            )
+    return evaluation.traces(numbers)
+
+
+def _evaluation(source: str, agent: Agent | None, episodes: int, greedy: bool) -> Evaluation:
+    """Test episodes of a run or a scenario."""
+    folder = folder_of(source)
+    if not (folder / CONFIG).is_file():
+        usual = "random" if script_of(source) is None else "oracle"
+        return _of_scenario(source, usual if agent is None else agent, episodes, greedy)
+    if agent is not None:
+        raise OptionError("agent", "a run is replayed by its own agent; name a scenario to let another play")
+    scenario, played_by = own_scenario(source), Player(str(read_json(folder / CONFIG).get("agent")))
+    if greedy and (played_by.is_person or played_by.is_model):
+        raise OptionError("greedy", f"the agent {played_by.agent!r} has played already")
+    if played_by.is_person:
+        return evaluation_of_person(folder, scenario, episodes)
+    if played_by.is_model:
+        return evaluation_of_model(folder, played_by.agent, scenario, episodes)
+    player = made_player(source, [], {"greedy": greedy}, None)
+    loaded = load(scenario)
+    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
+
+
+def _of_scenario(scenario: str, agent: Agent, episodes: int, greedy: bool) -> Evaluation:
+    player = player_of(agent, scenario)
+    if player.is_person or player.is_model:
+        raise OptionError(
+            "agent",
+            f"got {player.agent!r}, who plays for `socialai evaluate`; what that writes is replayed by its folder",
+        )
+    if greedy and not player.is_trained:
+        raise OptionError("greedy", f"the agent {player.agent!r} has no use for it")
+    if player.is_trained and isinstance(agent, str | Path):
+        player = made_player(player.agent, [scenario], {"greedy": greedy}, None)
+    loaded = load(scenario)
+    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
