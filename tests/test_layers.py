@@ -109,9 +109,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "runs": (
         TEXT_SIDE
         | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "replay", "evaluation"}
-        | {"reporting"}
-        | {"runs.folder", "runs.options", "runs.versions"},
-        {"yaml", "trainer"},
+        | {"baselines", "reporting", "runs.folder", "runs.options", "runs.versions"},
+        {"pydantic", "yaml", "trainer"},
     ),
     "experiments": (
         TEXT_SIDE

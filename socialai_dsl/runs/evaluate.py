@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
@@ -28,7 +28,15 @@ from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
 from socialai_dsl.frontend import load
 from socialai_dsl.replay.endings import short_name
 from socialai_dsl.runs.copies import keep_scenario
-from socialai_dsl.runs.folder import CONFIG, EVALUATIONS, RESULT, only_writer, scenario_folder_name
+from socialai_dsl.runs.folder import (
+    CONFIG,
+    EVALUATIONS,
+    LOCK_FILES,
+    RESULT,
+    new_folders,
+    only_writer,
+    scenario_folder_name,
+)
 from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
@@ -72,19 +80,20 @@ def evaluate(
     """
     named = [] if scenario is None else [str(scenario)]
     player = made_player(agent, named, options, None if out is None else Path(out))
-    return next(evaluate_each(player, named, episodes, record, None if out is None else Path(out)))
+    place = None if out is None else Path(out)
+    with contextlib.closing(evaluate_each(player, named, episodes, record, place)) as evaluations:
+        return next(evaluations)
 
 
 def evaluate_each(
     player: Player, scenarios: Sequence[str], episodes: int, record: int = RECORDED, out: Path | None = None
-) -> Iterator[Evaluation]:
+) -> Generator[Evaluation, None, None]:
     """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
     if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
         raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
     folder = player.kept_in if player.is_model or player.is_person else out
     results = []
-    # Every session of a person has a folder of its own, which nobody else knows of.
-    with contextlib.nullcontext() if folder is None or player.is_person else only_writer(folder):
+    with contextlib.nullcontext() if folder is None else _writing(folder):
         for scenario in scenarios or [own_scenario(player.agent)]:
             evaluation = _evaluated(player, scenario, episodes, record, folder)
             results.append(result_of(evaluation))
@@ -94,19 +103,28 @@ def evaluate_each(
             yield evaluation
 
 
+@contextlib.contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Be the only writer of a folder, which goes again if nothing could be played."""
+    with new_folders(folder) as made, only_writer(folder):
+        made.update(folder / name for name in LOCK_FILES)
+        yield
+
+
 def _evaluated(player: Player, scenario: str, episodes: int, record: int, out: Path | None) -> Evaluation:
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
     if out is None:
         return play_test_set(playing, scenario, loaded, compiled(loaded), episodes)
     place = out / scenario_folder_name(scenario)
-    place.mkdir(parents=True, exist_ok=True)
-    kept = keep_scenario(place, scenario, loaded).scenario
-    # As a run that trained nothing, so that reports take it as one.
-    write_json(place / CONFIG, {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed})
-    evaluation = replace(
-        play_test_set(playing, scenario, loaded, compiled(loaded), episodes), folder=place, kept=kept
-    )
+    with new_folders(place) as made:
+        kept = keep_scenario(place, scenario, loaded).scenario
+        # As a run that trained nothing, so that reports take it as one.
+        settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
+        write_json(place / CONFIG, settings)
+        made.update(place.iterdir())
+        played = play_test_set(playing, scenario, loaded, compiled(loaded), episodes)
+    evaluation = replace(played, folder=place, kept=kept)
     write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
     write_json(place / RESULT, result_of(evaluation))
     return evaluation

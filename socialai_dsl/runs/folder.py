@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
@@ -257,3 +258,29 @@ def only_writer(folder: Path) -> Iterator[None]:
         except HeldError as error:
             raise UsageError(f"{error}; wait until it ends, or choose another folder") from None
         yield
+
+
+@contextlib.contextmanager
+def new_folders(folder: Path) -> Iterator[set[Path]]:
+    """Make a folder, and take it back if the block cannot even begin its work.
+
+    Yields:
+        The set to which the block adds what it has put there to begin with. If it raises, these go, and so do the
+        folders that were made, unless they hold something else.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    before, begun = set(folder.iterdir()), set[Path]()
+    try:
+        yield begun
+    except Exception:
+        if set(folder.iterdir()) <= before | begun:
+            for path in {one for one in begun - before if one.exists()}:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        with contextlib.suppress(OSError):  # it holds something else
+            for one in missing:
+                one.rmdir()
+        raise
