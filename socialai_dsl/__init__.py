@@ -7,8 +7,8 @@ The public surface, imported on first use so that checking a file loads neither 
 * `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
 * `train(scenario, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
-* `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)` and `trace(scenario)` do what the commands do,
-  with every kind of agent, and return objects.
+* `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)` and `trace(scenario)` do what the commands
+  do, with every kind of agent, and return objects.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
 """

@@ -15,7 +15,14 @@ SHOWN = {
 
 
 @pytest.mark.parametrize(
-    "module", ["socialai_dsl", "socialai_dsl.evaluation", "socialai_dsl.llm", "socialai_dsl.replay"]
+    "module",
+    [
+        "socialai_dsl",
+        "socialai_dsl.episodes",
+        "socialai_dsl.evaluation",
+        "socialai_dsl.llm",
+        "socialai_dsl.replay",
+    ],
 )
 def test_every_public_name_has_its_place(module: str) -> None:
     public = {name for name in import_module(module).__all__ if not name.isupper()}

@@ -35,7 +35,7 @@ from socialai_dsl.episodes.policies import (
 )
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
 from socialai_dsl.episodes.stage import Stage
-from socialai_dsl.episodes.traces import Tracing, trace, trace_of
+from socialai_dsl.episodes.traces import Tracing, trace_of
 
 __all__ = [
     "AGENT",
@@ -67,7 +67,6 @@ __all__ = [
     "film",
     "play",
     "play_async",
-    "trace",
     "trace_of",
     "wilson_interval",
 ]

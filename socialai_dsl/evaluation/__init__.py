@@ -11,8 +11,6 @@ The page `docs/evaluation.md` shows each of these at work:
 """
 
 from socialai_dsl.baselines import Baselines, Level
-from socialai_dsl.episodes.players import ModelOptions, Player
-from socialai_dsl.episodes.results import EvalResult, wilson_interval
 from socialai_dsl.evaluation.chance import Sample, play_at_random
 from socialai_dsl.evaluation.coverage_report import Coverage, coverage
 from socialai_dsl.evaluation.levels import baselines
@@ -22,11 +20,8 @@ from socialai_dsl.evaluation.test_set import Evaluation, evaluate_policy
 __all__ = [
     "Baselines",
     "Coverage",
-    "EvalResult",
     "Evaluation",
     "Level",
-    "ModelOptions",
-    "Player",
     "Sample",
     "ScriptReport",
     "baselines",
@@ -34,5 +29,4 @@ __all__ = [
     "evaluate_policy",
     "play_at_random",
     "play_script",
-    "wilson_interval",
 ]

@@ -11,8 +11,8 @@ from PIL import Image
 
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.episodes import EvalResult, wilson_interval
 from socialai_dsl.episodes.players import Player
-from socialai_dsl.evaluation import EvalResult, wilson_interval
 from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.replay.endings import Ending, endings_of
 
