@@ -89,7 +89,9 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (
-        TEXT_SIDE | {"errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"},
+        TEXT_SIDE
+        | {"errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"}
+        | {"llm"},
         {"numpy", "rich", "textual"},
     ),
     "evaluation": (

@@ -1,13 +1,19 @@
 """Options that several commands have, and numbers on the command line."""
 
+from __future__ import annotations
+
 import argparse
 import math
 import re
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.errors import UsageError
+
+if TYPE_CHECKING:
+    from socialai_dsl.checking.briefing import Briefing
+    from socialai_dsl.checking.loaded import Loaded
 
 STYLE: Final[dict[str, Any]] = {
     "choices": ("prose", "grid", "json"),
@@ -24,6 +30,47 @@ _SEEDS: Final = 2**63
 _SHOWN: Final = 40
 """The most characters of a mistyped number that a message repeats."""
 _IDENTIFIER: Final = re.compile(r"\w[\w.-]{0,63}")
+
+
+TELL_OPTIONS: Final = ("tell", "goal", "language")
+
+
+def add_tell(parser: argparse.ArgumentParser) -> None:
+    """Declare what players are told before the first observation."""
+    group = parser.add_argument_group(
+        "what is told", "to language models and people; other agents read nothing"
+    )
+    group.add_argument(
+        "--tell",
+        choices=("nothing", "instructions", "goal"),
+        help="what players are told of the task (default: the scenario's instructions, where it has some)",
+    )
+    group.add_argument("--goal", metavar="TEXT", help="tell this sentence about the aim")
+    group.add_argument(
+        "--language",
+        metavar="TAG",
+        help="language of the instructions, such as de (default: the one written first)",
+    )
+
+
+def tell_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What was typed of these, as `brief` takes it."""
+    given = {name: getattr(arguments, name) for name in TELL_OPTIONS}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def brief_as_typed(loaded: Loaded, arguments: argparse.Namespace) -> Briefing:
+    """What is to be told of a scenario or suite.
+
+    Raises:
+        UsageError: there is nothing of that kind to be told.
+    """
+    from socialai_dsl.checking.briefing import brief
+
+    try:
+        return brief(loaded, **tell_options(arguments))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,16 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.arguments import episodes, identifier, natural, refuse, seed
+from socialai_dsl.cli.arguments import (
+    TELL_OPTIONS,
+    add_tell,
+    episodes,
+    identifier,
+    natural,
+    refuse,
+    seed,
+    tell_options,
+)
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_options
 from socialai_dsl.cli.terminal import json_text
@@ -75,8 +84,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="for the agent human: begins the name of the session's folder (default: the time alone)",
     )
     parser.add_argument(
+        "--view",
+        choices=("seat", "room"),
+        help="for the agent human: show what the agent sees (default), or the whole room",
+    )
+    parser.add_argument(
         "--json", action="store_true", help="print a JSON array with one object for each scenario"
     )
+    add_tell(parser)
     add_options(parser)
 
 
@@ -108,11 +123,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
 def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
     """Refuse, by name, what the agent would ignore."""
     agent = arguments.run
-    names = {"greedy", "seed", "device", "net", "participant", *MODEL_OPTIONS}
+    names = {"greedy", "seed", "device", "net", "participant", "view", *TELL_OPTIONS, *MODEL_OPTIONS}
     if agent.startswith(MODEL_PREFIX):
-        names -= set(MODEL_OPTIONS)
+        names -= {*TELL_OPTIONS, *MODEL_OPTIONS}
     elif agent in UNTRAINED:
-        names -= {"random": {"seed"}, "human": {"participant"}}.get(agent, set())
+        names -= {"random": {"seed"}, "human": {"participant", "view", *TELL_OPTIONS}}.get(agent, set())
     else:
         names -= {"greedy", "seed", "device", "net"}
     refuse(arguments, names, f"the agent {agent!r} has no use for it")
@@ -120,9 +135,11 @@ def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
 
 def _options(arguments: argparse.Namespace) -> dict[str, Any]:
     """What was typed of the options of the agent."""
+    told = tell_options(arguments)
     if arguments.run.startswith(MODEL_PREFIX):
-        return model_options(arguments)
-    given = {name: getattr(arguments, name) for name in ("greedy", "seed", "device", "net")}
+        return model_options(arguments) | told
+    names = ("view",) if arguments.run == "human" else ("greedy", "seed", "device", "net")
+    given = told | {name: getattr(arguments, name) for name in names}
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -51,9 +51,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="what a reply without an action does: pass the turn (default), ask again, or end the episode",
     )
     group.add_argument(
-        "--goal", metavar="TEXT", help="what to tell the model about the aim (default: nothing)"
-    )
-    group.add_argument(
         "--grammar",
         action="store_true",
         default=None,

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.arguments import identifier, seed
+import socialai_dsl
+from socialai_dsl.cli.arguments import add_tell, brief_as_typed, identifier, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.episodes.players import HUMAN_FOLDER, session_folder
@@ -39,12 +40,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ID",
         help="begins the name of the session's folder (default: the time alone)",
     )
+    parser.add_argument(
+        "--view",
+        choices=("room", "seat"),
+        default="room",
+        help="show the whole room (default), or what the agent sees and nothing else",
+    )
+    add_tell(parser)
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play episode after episode until the player quits."""
     from socialai_dsl.play import play
 
+    briefing = brief_as_typed(socialai_dsl.load(arguments.scenario), arguments)
     name = scenario_folder_name(arguments.scenario)
     session = session_folder(arguments.out, arguments.participant)
 
@@ -53,7 +62,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         return f"{name}, seed {own}", {"seed": own}
 
     about = {"session": session.name, "scenario": name}
-    for played in play(arguments.scenario, episode, session / name, about):
+    for played in play(arguments.scenario, episode, session / name, about, briefing, arguments.view):
         print(printable(str(played)))
     print(f"every step is in {session / name}", file=sys.stderr)
     return Exit.GOOD

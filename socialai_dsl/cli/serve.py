@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from typing import Final
 
-from socialai_dsl.cli.arguments import STYLE, port, positive, seconds
+from socialai_dsl.cli.arguments import STYLE, add_tell, brief_as_typed, port, positive, seconds
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=port, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
     parser.add_argument("--style", **STYLE)
+    add_tell(parser)
     parser.add_argument(
         "--sessions",
         type=positive,
@@ -60,14 +61,18 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("serving OpenEnv needs openenv: pip install 'socialai-dsl[openenv]'")
     import socialai_dsl
 
-    program = socialai_dsl.compile(socialai_dsl.load(arguments.scenario))
+    loaded = socialai_dsl.load(arguments.scenario)
+    program = socialai_dsl.compile(loaded)
+    briefing = brief_as_typed(loaded, arguments)
     import uvicorn
 
     from socialai_dsl.llm.gate import IDLE, MOST_BYTES
     from socialai_dsl.llm.openenv import application
 
     hosts = [arguments.host, *arguments.allow]
-    app = application(program, arguments.style or "prose", arguments.sessions, hosts, arguments.idle or IDLE)
+    app = application(
+        program, arguments.style or "prose", briefing, arguments.sessions, hosts, arguments.idle or IDLE
+    )
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
     try:
         listening = socket.create_server((arguments.host, arguments.port), family=family)

@@ -22,7 +22,15 @@ Scenario = str | Path | Playable
 
 def playable_of(scenario: Scenario) -> Playable:
     """The program of a scenario, or the programs of a suite, given by name or path, or itself."""
-    return scenario if isinstance(scenario, Playable) else compiled(load(scenario))
+    return load_playable(scenario)[0]
+
+
+def load_playable(scenario: Scenario) -> tuple[Playable, Loaded | None]:
+    """The program of a scenario, and what it was made of; None for what is a program already."""
+    if isinstance(scenario, Playable):
+        return scenario, None
+    loaded = load(scenario)
+    return compiled(loaded), loaded
 
 
 def compiled(loaded: Loaded) -> Playable:

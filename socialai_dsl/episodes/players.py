@@ -10,6 +10,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing, Tell, brief
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.episodes.play import Rooms
 from socialai_dsl.episodes.policies import (
     FunctionPolicy,
@@ -40,7 +42,6 @@ class ModelOptions:
         history: observations in a request; None: the whole episode.
         temperature, max_tokens: of replies; None: the server's.
         on_invalid: whether a reply without an action passes the turn, is asked for again, or ends the episode.
-        goal: what the model is told of the aim.
         grammar: whether replies are held to a grammar, which llama.cpp's server can.
         probes: whether the scenario's probes are asked apart from play, kept in later requests, or not asked.
         concurrency: episodes played at once.
@@ -57,7 +58,6 @@ class ModelOptions:
     temperature: float | None = None
     max_tokens: int | None = None
     on_invalid: Literal["noop", "retry", "fail"] = "noop"
-    goal: str = ""
     grammar: bool = False
     probes: Literal["apart", "kept", "off"] = "apart"
     concurrency: int = 4
@@ -80,6 +80,8 @@ class Player:
         folder: where the file of such a network is looked for first.
         out: where what a person or a language model plays is kept, by default in `runs`.
         options: how a language model is asked.
+        tell, goal, language: what a language model or a person is told of the task, see `brief`; others read nothing.
+        view: whether a person sees what the agent sees, or the whole `room`; all others have the seat's view.
         policy: a policy of one's own, which plays.
 
     Raises:
@@ -95,6 +97,10 @@ class Player:
     out: Path | None = None
     options: ModelOptions | None = None
     policy: Policy | None = None
+    tell: Tell | None = None
+    goal: str = ""
+    language: str | None = None
+    view: Literal["seat", "room"] = "seat"
 
     def __post_init__(self) -> None:
         agent: object = self.agent  # whatever the caller gives
@@ -135,6 +141,21 @@ class Player:
     def is_trained(self) -> bool:
         """Whether a network plays whose checkpoint `agent` names."""
         return self.policy is None and self.agent not in UNTRAINED and not self.is_model
+
+    def briefing(self, loaded: Loaded) -> Briefing:
+        """What is told of a scenario or suite before the first observation.
+
+        Raises:
+            UsageError: there is nothing of that kind to be told, or the player reads nothing.
+        """
+        if not (self.is_model or self.is_person):
+            if self.tell is not None or self.goal or self.language is not None:
+                raise UsageError(f"tell: the agent {self.agent!r} reads nothing")
+            return NO_BRIEFING
+        try:
+            return brief(loaded, self.tell, self.goal, self.language)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
 
     @property
     def kept_in(self) -> Path:

@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.briefing import Briefing
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Asker, probe_names
 from socialai_dsl.episodes.players import MODEL_PREFIX, ModelOptions
@@ -64,6 +65,7 @@ def let_a_model_play(
     episodes: int,
     out: Path,
     options: ModelOptions,
+    briefing: Briefing,
 ) -> ModelEpisodes:
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
@@ -75,6 +77,7 @@ def let_a_model_play(
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
         options: how it is asked.
+        briefing: what it is told of the task.
 
     Raises:
         UsageError: the endpoint does not answer, or an option is not what was expected.
@@ -94,6 +97,7 @@ def let_a_model_play(
         "program_sha256": program.sha256,
         "model": endpoint.model,
         "address": endpoint.address,
+        **briefing.record(),
         **vars(manner),
         **endpoint.options,
         "probes": f"{manner.probes} {Asker(loaded).sha256}" if names else None,
@@ -102,7 +106,7 @@ def let_a_model_play(
     progress = _Progress(episodes)
     try:
         place = transcripts(folder, settings)
-        player = LanguageModelPlayer(program, endpoint, manner, place, loaded if names else None)
+        player = LanguageModelPlayer(program, endpoint, manner, place, loaded if names else None, briefing)
         played = player.play(episodes, options.concurrency, budget, progress.note)
     except OtherSettings as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
@@ -137,7 +141,7 @@ def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:
 def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
     from socialai_dsl.llm.endpoint import OPENAI, Endpoint
 
-    for name, given in (("the model", agent), ("--base-url", options.base_url), ("--goal", options.goal)):
+    for name, given in (("the model", agent), ("--base-url", options.base_url)):
         if not _is_unicode(given or ""):
             raise UsageError(f"{name}: got {given!r}, expected a text in Unicode")
     if options.temperature is not None and not isfinite(options.temperature):

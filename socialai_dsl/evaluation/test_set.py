@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.factory import compiled, make, make_vec
@@ -50,6 +51,7 @@ class Evaluation:
         more: figures that count for this agent alone.
         replies: of a language model, what it answered before each action of each episode.
         folder: where it is kept, if it is. kept: the name that the scenario has there.
+        briefing: what the player was told of the task.
     """
 
     scenario: str
@@ -64,6 +66,7 @@ class Evaluation:
     replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
     folder: Path | None = None
     kept: str | None = None
+    briefing: Briefing = NO_BRIEFING
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
@@ -176,16 +179,16 @@ def play_test_set(
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
         RunFailed: a language model has spent its budget.
     """
-    endings = endings_of(loaded, program)
+    endings, briefing = endings_of(loaded, program), player.briefing(loaded)
     if player.is_person:
-        person = _let_a_person_play(player.kept_in, scenario, program, episodes)
-        return _of_person(person, scenario, loaded, program, player)
+        person = _let_a_person_play(player, scenario, program, episodes, briefing)
+        return _of_person(person, scenario, loaded, program, player, briefing)
     if player.is_model:
         assert player.options is not None, "internal: a language model has options"
         played = let_a_model_play(
-            player.agent, scenario, loaded, program, episodes, player.kept_in, player.options
+            player.agent, scenario, loaded, program, episodes, player.kept_in, player.options, briefing
         )
-        return _of_model(played, scenario, loaded, program, player)
+        return _of_model(played, scenario, loaded, program, player, briefing)
     if player.is_trained:
         require_trainer()
     envs = make_vec(
@@ -218,7 +221,12 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
 
 
 def _of_model(
-    played: ModelEpisodes, scenario: str, loaded: Loaded, program: Playable, player: Player
+    played: ModelEpisodes,
+    scenario: str,
+    loaded: Loaded,
+    program: Playable,
+    player: Player,
+    briefing: Briefing = NO_BRIEFING,
 ) -> Evaluation:
     return Evaluation(
         scenario,
@@ -230,6 +238,7 @@ def _of_model(
         played.actions,
         more=played.figures,
         replies=played.replies,
+        briefing=briefing,
     )
 
 
@@ -261,19 +270,19 @@ def evaluate_policy(
 
 
 def _let_a_person_play(
-    session: Path, scenario: str, program: Playable, episodes: int
+    player: Player, scenario: str, program: Playable, episodes: int, briefing: Briefing
 ) -> "list[FinishedEpisode]":
     """Let a person play test episodes until they quit, and keep everything in the session's folder."""
     from socialai_dsl.play import play
 
-    name = scenario_folder_name(scenario)
+    session, name = player.kept_in, scenario_folder_name(scenario)
     about = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
-        title = f"{name}, test episode {number}"
+        title = f"test episode {number}" if player.view == "seat" else f"{name}, test episode {number}"
         return (title, {"options": {"test_episode": number}}) if number < episodes else None
 
-    return play(scenario, episode, session / name, about, practice=False)
+    return play(scenario, episode, session / name, about, briefing, player.view, practice=False)
 
 
 def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
@@ -298,7 +307,12 @@ def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
 
 
 def _of_person(
-    played: "Sequence[FinishedEpisode]", scenario: str, loaded: Loaded, program: Playable, player: Player
+    played: "Sequence[FinishedEpisode]",
+    scenario: str,
+    loaded: Loaded,
+    program: Playable,
+    player: Player,
+    briefing: Briefing = NO_BRIEFING,
 ) -> Evaluation:
     if not played:
         raise UsageError("no episode was played to its end")
@@ -311,7 +325,8 @@ def _of_person(
         names,
     )
     actions = {number: p.actions for number, p in enumerate(played)}
-    return Evaluation(scenario, loaded, program, player, result, endings_of(loaded, program), actions)
+    endings = endings_of(loaded, program)
+    return Evaluation(scenario, loaded, program, player, result, endings, actions, briefing=briefing)
 
 
 def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]:

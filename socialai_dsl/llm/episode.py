@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.briefing import Briefing, brief
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import ScenarioEnv, make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.copying import Copied
-from socialai_dsl.envs.factory import Scenario
+from socialai_dsl.envs.factory import Scenario, load_playable
 from socialai_dsl.episodes.play import AGENT, Rooms
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
@@ -98,11 +99,13 @@ class Episode(Copied):
         mode: how replies are given: `text`, `json` or `tools`.
         on_invalid: the effect of a reply without an action: `noop` passes the turn, `retry` asks again (the third such
             reply in a row passes the turn), `fail` ends the episode.
-        goal: a sentence about the aim for the instructions; none by default, as trained agents are told nothing.
+        briefing: what the instructions say of the task, see `brief`; by default what the scenario's file says, and
+            of a program nothing.
         probes: the scenario as `load` returns it, to ask its probes, which changes nothing else.
 
     Attributes:
-        instructions: the text that a model reads before the first observation.
+        instructions: the text that a model reads before the first observation; of a suite, once `reset` has drawn
+            what is played.
         actions: the actions of this episode, int64 (heads,) each.
         answered: the answers to probes of this episode, in the order given.
 
@@ -117,18 +120,22 @@ class Episode(Copied):
         style: Style = "prose",
         mode: Mode = "text",
         on_invalid: OnInvalid = "noop",
-        goal: str = "",
+        briefing: Briefing | None = None,
         probes: Loaded | None = None,
     ) -> None:
         if on_invalid not in get_args(OnInvalid):
             raise ValueError(
                 f"on_invalid: got {on_invalid!r}, expected one of {', '.join(get_args(OnInvalid))}"
             )
-        self._rooms = Rooms(make(scenario))
+        program, loaded = load_playable(scenario)
+        self._rooms = Rooms(make(program))
         self.env: ScenarioEnv = self._rooms.env
         self.view = TextView(self.env.program, style)
         self.language = ActionLanguage(self.env.program)
-        self.instructions = self.view.instructions(mode, goal)
+        self.briefing = brief(loaded) if briefing is None else briefing
+        self._mode: Mode = mode
+        self._member: str | None = None
+        self.instructions = self.view.instructions(mode, self.briefing.text())
         self.actions: list[NDArray[np.int64]] = []
         self.answered: list[AnsweredQuestion] = []
         self._asker = None if probes is None else Asker(probes)
@@ -155,6 +162,8 @@ class Episode(Copied):
         self.answered = []
         if self._asker is not None:
             self._questions = self._asker.reset(seed, options, self._seen["image"])
+        self._member = self._rooms.info.get("member")
+        self.instructions = self.view.instructions(self._mode, self.briefing.text(self._member))
         self._text = self.view.observe(self._seen, self._rooms.info)
         return self._text
 
@@ -251,7 +260,7 @@ class Episode(Copied):
             self._result = replace(
                 self._result, ending=outcome_name(step.info), success=bool(step.success[0])
             )
-        self._text = self.view.observe(self._seen, step.info)
+        self._text = self._news(step.info) + self.view.observe(self._seen, step.info)
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
         return Turn(told + self._text, reward, done, action, error)
 
@@ -259,6 +268,12 @@ class Episode(Copied):
     def _seen(self) -> dict[str, NDArray[Any]]:
         """The present observation."""
         return {name: value[0] for name, value in self._rooms.observations[AGENT].items()}
+
+    def _news(self, info: Mapping[str, Any]) -> str:
+        """What is told where an episode goes on with another member of a suite; mostly nothing."""
+        before, self._member = self.briefing.text(self._member), info.get("member")
+        now = self.briefing.text(self._member)
+        return f"{now}\n\n" if now != before else ""
 
     def _note(self, reward: float = 0.0, played: bool = False) -> None:
         """Count a reply, and the step that it played."""

@@ -11,7 +11,9 @@ from inspect_ai.model import ChatMessage, ChatMessageAssistant, ChatMessageSyste
 from inspect_ai.scorer import Score, Scorer, Target, mean, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from socialai_dsl.envs.factory import playable_of
+from socialai_dsl.checking.briefing import Tell, brief
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CONTEXT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.view import Style
@@ -29,7 +31,9 @@ def scenario(
     mode: Literal["text", "json"] = "text",
     history: int | None = WHOLE,
     on_invalid: OnInvalid = "noop",
+    tell: Tell | None = None,
     goal: str = "",
+    language: str | None = None,
 ) -> Task:
     """Test episodes 0 to `episodes - 1` of a scenario, a sample each.
 
@@ -40,7 +44,10 @@ def scenario(
         mode: how actions are given, see `ActionLanguage`.
         history: how many observations the model is shown, the present one included; None: the whole episode.
         on_invalid: what a reply without an action does, see `Episode`.
-        goal: what the instructions say of the aim; nothing by default.
+        tell: what the model is told of the task: `nothing`, the scenario's `instructions` or the `goal`; None: the goal
+            if one is given, else the instructions if there are some.
+        goal: a sentence about the aim.
+        language: of the instructions, such as `de`; None: the one written first.
 
     Raises:
         ScenarioError: the scenario does not exist, or has mistakes.
@@ -49,8 +56,9 @@ def scenario(
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
     left_out((), history)  # a limit that is none is told before anything is played
-    program = playable_of(scenario)
-    options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid, "goal": goal}
+    loaded = load(scenario)
+    program, briefing = compiled(loaded), brief(loaded, tell, goal, language)
+    options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid, "briefing": briefing}
     beginning = Episode(program, **options)
     samples = [
         Sample(
@@ -65,7 +73,7 @@ def scenario(
         dataset=MemoryDataset(samples, name=scenario),
         solver=player(lambda: Episode(program, **options), history),
         scorer=outcome(),
-        metadata={"scenario": scenario, "program_sha256": program.sha256},
+        metadata={"scenario": scenario, "program_sha256": program.sha256, **briefing.record()},
     )
 
 

@@ -22,6 +22,7 @@ from openenv.core.env_server.types import (
 )
 from pydantic import Field, model_validator
 
+from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.llm.episode import Episode
 from socialai_dsl.llm.gate import IDLE, Gate
 from socialai_dsl.llm.view import Style
@@ -73,14 +74,15 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
     Args:
         program: of a scenario or suite.
         style: how observations are written.
+        briefing: what the instructions say of the task.
     """
 
     SUPPORTS_CONCURRENT_SESSIONS: ClassVar[bool] = True
 
-    def __init__(self, program: Playable, style: Style) -> None:
+    def __init__(self, program: Playable, style: Style, briefing: Briefing = NO_BRIEFING) -> None:
         super().__init__()
         self._name = program.name
-        self._episode = Episode(program, style)
+        self._episode = Episode(program, style, briefing=briefing)
         self._id: str | None = None
         self._seed: int | None = None
         self._test_episode: int | None = None
@@ -164,6 +166,7 @@ class ScenarioClient(EnvClient[Reply, Told, Progress]):
 def application(
     program: Playable,
     style: Style = "prose",
+    briefing: Briefing = NO_BRIEFING,
     sessions: int = 100,
     hosts: Iterable[str] = (),
     idle: float = IDLE,
@@ -173,13 +176,17 @@ def application(
     Args:
         program: its program.
         style: how observations are written, see `TextView`.
+        briefing: what the instructions say of the task, see `brief`; by default nothing.
         sessions: how many may play at once.
         hosts: names under which it may be asked, beside those of the loopback interface.
         idle: seconds after which a session ends that sends nothing.
     """
     limits = ConcurrencyConfig(max_concurrent_envs=sessions, session_timeout=idle)
     app = create_fastapi_app(
-        lambda: ScenarioEnvironment(program, style), Reply, Told, concurrency_config=limits
+        lambda: ScenarioEnvironment(program, style, briefing),
+        Reply,
+        Told,
+        concurrency_config=limits,
     )
     app.add_middleware(Gate, hosts=tuple(hosts), idle=idle)
     app.add_exception_handler(ValueError, _refuse)

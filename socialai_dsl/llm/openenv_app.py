@@ -5,9 +5,10 @@
 
 import os
 
-from socialai_dsl.envs.factory import playable_of
+from socialai_dsl.checking.briefing import brief
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.frontend import load
 from socialai_dsl.llm.openenv import application
 
-app = application(
-    playable_of(os.environ.get("SCENARIO", "talkitout")), hosts=os.environ.get("ALLOW", "").split(",")
-)
+loaded = load(os.environ.get("SCENARIO", "talkitout"))
+app = application(compiled(loaded), briefing=brief(loaded), hosts=os.environ.get("ALLOW", "").split(","))

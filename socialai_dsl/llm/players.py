@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.atomic import write_json
+from socialai_dsl.checking.briefing import Briefing
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
@@ -44,7 +45,7 @@ class Manner:
     """How a model plays.
 
     Attributes:
-        style, mode, on_invalid, goal: see `Episode`.
+        style, mode, on_invalid: see `Episode`.
         history: how many observations a request holds, the present one included; None: the whole episode.
         grammar: whether replies are held to a grammar, which llama.cpp's server understands.
         probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
@@ -54,7 +55,6 @@ class Manner:
     style: Style = "prose"
     mode: Mode = "text"
     on_invalid: OnInvalid = "noop"
-    goal: str = ""
     history: int | None = WHOLE
     grammar: bool = False
     probes: Probing = "apart"
@@ -62,7 +62,7 @@ class Manner:
     @property
     def of_episodes(self) -> dict[str, Any]:
         """The arguments of `Episode` among them."""
-        return {name: getattr(self, name) for name in ("style", "mode", "on_invalid", "goal")}
+        return {name: getattr(self, name) for name in ("style", "mode", "on_invalid")}
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,7 @@ class LanguageModelPlayer:
         manner: how it plays.
         place: of the transcript of each episode, see `transcripts`.
         loaded: what the program was made of; without it no probes are asked.
+        briefing: what the model is told of the task.
     """
 
     def __init__(
@@ -202,7 +203,9 @@ class LanguageModelPlayer:
         manner: Manner,
         place: Callable[[int], Path],
         loaded: Loaded | None = None,
+        briefing: Briefing | None = None,
     ) -> None:
+        self._briefing = briefing
         self._loaded = None if manner.probes == "off" else loaded
         self._program = program
         self._endpoint = endpoint
@@ -244,7 +247,9 @@ class LanguageModelPlayer:
         failures: list[Exception] = []
 
         async def work(client: httpx.AsyncClient) -> None:
-            episode = Episode(self._program, **self._manner.of_episodes, probes=self._loaded)
+            episode = Episode(
+                self._program, **self._manner.of_episodes, briefing=self._briefing, probes=self._loaded
+            )
             try:
                 for number in waiting:
                     path = self._place(number)

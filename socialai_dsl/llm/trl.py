@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature
 from typing import Any, ClassVar, Final, Literal
 
-from socialai_dsl.envs.factory import Scenario, playable_of
+from socialai_dsl.checking.briefing import Briefing, Tell, brief
+from socialai_dsl.envs.factory import Scenario, load_playable
 from socialai_dsl.llm.actions import ActionLanguage, ToolCall
 from socialai_dsl.llm.episode import TEST_SET, Episode
 from socialai_dsl.llm.view import Style
@@ -24,10 +25,10 @@ class SocialEnv:
 
     _program: ClassVar[Playable]
     _style: ClassVar[Style]
-    _goal: ClassVar[str]
+    _briefing: ClassVar[Briefing]
 
     def __init__(self) -> None:
-        self._episode = Episode(self._program, self._style, mode="tools", goal=self._goal)
+        self._episode = Episode(self._program, self._style, mode="tools", briefing=self._briefing)
         self._done = True
 
     def reset(self, seed: int | None = None, test_episode: int | None = None, **_: Any) -> str:
@@ -45,7 +46,8 @@ class SocialEnv:
                 f"test_episode: got {test_episode!r}, expected a number from 0 to {TEST_SET - 1}"
             )
         self._done = False
-        return f"{self._episode.instructions}\n\n{self._episode.reset(seed, test_episode)}"
+        seen = self._episode.reset(seed, test_episode)
+        return f"{self._episode.instructions}\n\n{seen}"
 
     def get_reward(self) -> float:
         """Sum of the episode's rewards so far."""
@@ -60,20 +62,30 @@ class SocialEnv:
         return f"{turn.text}\n{_OVER}" if turn.done else turn.text
 
 
-def social_env(scenario: Scenario, style: Style = "prose", goal: str = "") -> type[SocialEnv]:
+def social_env(
+    scenario: Scenario,
+    style: Style = "prose",
+    tell: Tell | None = None,
+    goal: str = "",
+    language: str | None = None,
+) -> type[SocialEnv]:
     """The environment class of a scenario for TRL: `GRPOTrainer(..., environment_factory=social_env("talkitout"))`.
 
     Args:
         scenario: a path, a name or a program.
         style: how observations are written: `prose`, `grid` or `json`.
-        goal: a sentence about the aim for the instructions; none by default.
+        tell: what the model is told of the task: `nothing`, the scenario's `instructions` or the `goal`; None: the goal
+            if one is given, else the instructions if there are some. A program has none.
+        goal: a sentence about the aim.
+        language: of the instructions, such as `de`; None: the one written first.
 
     Raises:
         ScenarioError: the scenario has mistakes.
+        ValueError: there is nothing of that kind to be told.
     """
-    program = playable_of(scenario)
+    program, loaded = load_playable(scenario)
     tools = [tool["function"] for tool in ActionLanguage(program).tools()]
-    content = {"_program": program, "_style": style, "_goal": goal}
+    content = {"_program": program, "_style": style, "_briefing": brief(loaded, tell, goal, language)}
     # Rewards are logged under the name of the class.
     return type(program.name, (SocialEnv,), {**content, **{tool["name"]: _method(tool) for tool in tools}})
 

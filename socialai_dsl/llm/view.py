@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.llm.actions import ActionLanguage, Mode
 from socialai_dsl.llm.looks import (
@@ -51,15 +52,16 @@ class TextView:
     Args:
         program: of a scenario or suite.
         style: `prose` (sentences with places in steps), `grid` (letters with a legend) or `json`.
+        colour: whether the letters of a grid have escape codes for colours, for a terminal.
 
     Raises:
         ValueError: there is no such style.
     """
 
-    def __init__(self, program: Playable, style: Style = "prose") -> None:
+    def __init__(self, program: Playable, style: Style = "prose", colour: bool = False) -> None:
         if style not in get_args(Style):
             raise ValueError(f"style: got {style!r}, expected one of {', '.join(get_args(Style))}")
-        self._style = style
+        self._style, self._colour = style, colour
         self._members = _members(program)
         self._kinds = kinds_of(list(self._members.values()))
         self._channels = channels_of(self._members.values())
@@ -85,17 +87,20 @@ class TextView:
             mode: how replies are given: `text`, `json` or `tools`.
             goal: a sentence about the aim; none by default.
         """
-        turns = max(program.header(Header.HORIZON) for program in self._members.values())
-        aim = goal or "Find out from what you see and hear what there is to do, and do it in few turns."
         return "\n\n".join(
             (
                 "You are in a room of square cells, in which there may be others. Every turn you are told what you "
                 "see and hear, and you reply with what you do and say.",
-                self._explanation(),
+                self.explanation(),
                 self._language.instructions(mode),
-                f"An episode lasts {turns} turns at most. {aim}",
+                self.task(goal),
             )
         )
+
+    def task(self, goal: str = "") -> str:
+        """How long an episode lasts, and what is told of the aim."""
+        turns = max(program.header(Header.HORIZON) for program in self._members.values())
+        return f"An episode lasts {turns} turns at most. {goal or UNTOLD}"
 
     def observe(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> str:
         """The observation of the present moment as text.
@@ -114,7 +119,7 @@ class TextView:
             [seen, "You hear:", *(f"- {line}" for line in heard)] if heard else [seen, "You hear nothing."]
         )
 
-    def _explanation(self) -> str:
+    def explanation(self) -> str:
         """How to read what is seen."""
         blocked = any(program.header(Header.FLAGS) & Flag.OCCLUSION for program in self._members.values())
         parts = [
@@ -163,7 +168,7 @@ class TextView:
         words = {cell: phrase(one, self._shared) for cell, one in told.items()}
         own_hands = [] if carried is None else [f"You carry {words[own]}."]
         if self._style == "grid":
-            return "\n".join([_picture(image, seen, words, directions), *own_hands])
+            return "\n".join([_picture(image, seen, words, directions, self._colour), *own_hands])
         places = sorted((p for p, cell in seen.items() if not is_surface(cell)), key=_nearness)
         surfaces = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
         areas = {cell: _areas(place for place, found in seen.items() if found == cell) for cell in surfaces}
@@ -194,6 +199,7 @@ def _picture(
     seen: Mapping[Place, Cell],
     words: Mapping[Cell, str],
     directions: tuple[str, ...],
+    colour: bool,
 ) -> str:
     """Letters, and below them what each stands for; of people also where they are, since their letters say less."""
     codes = np.ascontiguousarray(image[..., :LOOKS].transpose(1, 0, 2))
@@ -207,7 +213,7 @@ def _picture(
             look = letters(codes, VIEW - 1 - place[0], place[1] + VIEW // 2)
             where = f", {_where(place)}" if cell[0] == NPC else ""
             legend[f"{look} {words[cell]}{where}"] = None
-    return "\n".join(["You see:", draw_ansi(codes, (*_OWN, _UP)), *legend])
+    return "\n".join(["You see:", draw_ansi(codes, (*_OWN, _UP), colour), *legend])
 
 
 def _nearness(place: Place) -> tuple[int, Place]:

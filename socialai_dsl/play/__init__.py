@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
-    from socialai_dsl.play.game import FinishedEpisode
+    from socialai_dsl.checking.briefing import Briefing
+    from socialai_dsl.play.game import FinishedEpisode, Sight
     from socialai_dsl.play.screen import Episodes
 
 __all__ = ["play"]
@@ -21,6 +22,8 @@ def play(
     episodes: "Episodes",
     folder: Path,
     about: Mapping[str, Any] = MappingProxyType({}),
+    briefing: "Briefing | None" = None,
+    view: "Sight" = "room",
     practice: bool = True,
 ) -> "list[FinishedEpisode]":
     """Let a person at the terminal play; the episodes that were played to their end.
@@ -32,6 +35,8 @@ def play(
         episodes: which ones.
         folder: is made, and holds no other session.
         about: what the file says of the session.
+        briefing: what the person is told of the task; None: what the scenario's file says.
+        view: whether the person sees what the agent sees, or the whole room.
         practice: whether steps may be taken back and the like.
 
     Raises:
@@ -44,13 +49,14 @@ def play(
     from socialai_dsl.play.journal import FILE, Journal
     from socialai_dsl.play.screen import PlayApp
 
-    game = Game(scenario)
+    game = Game(scenario, briefing)
+    session = {**about, **game.briefing.record(), "view": view, "practice": practice}
     try:
-        with Journal(folder / FILE, {**about, "practice": practice}) as game.journal:
+        with Journal(folder / FILE, session) as game.journal:
             first = episodes(0)
             assert first is not None, "internal: there is at least one episode to play"
             game.begin(*first)
-            app = PlayApp(game, episodes, practice)
+            app = PlayApp(game, episodes, practice, view)
             done = app.run() or []
             if app.failure is not None:
                 raise app.failure

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.loaded import Loaded, LoadedSuite
+from socialai_dsl.checking.briefing import Briefing, brief
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.typed import Phrases
@@ -16,14 +16,17 @@ from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.frontend import load
+from socialai_dsl.llm.view import TextView
 from socialai_dsl.play.journal import Journal, read_journal
-from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
+from socialai_dsl.program_suite import Playable, outcome_name
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending, endings_of
 from socialai_dsl.replay.state import cast_of, present
 from socialai_dsl.replay.steps import describe_step
 from socialai_dsl.vocabulary import spelt
 
+Sight = Literal["seat", "room"]
+"""What a person sees: what the agent sees, or the whole room."""
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
 """What `describe` says of a member that is shown otherwise, or only counts."""
 
@@ -47,7 +50,7 @@ class GameMoment:
     """A moment of an episode.
 
     Attributes:
-        view: what the agent sees, uint8 (7, 7, C).
+        view: what the agent sees, uint8 (7, 7, C). seen: the same and what it hears, as text with escape codes.
         member: of a suite, which scenario is played.
         action: what led here, int64 (heads,); None before the first step.
         lines: what was said and heard so far.
@@ -56,6 +59,7 @@ class GameMoment:
     """
 
     view: NDArray[np.uint8]
+    seen: str
     member: str | None
     action: NDArray[np.int64] | None = None
     lines: tuple[DialogueLine, ...] = ()
@@ -115,22 +119,25 @@ class Game(Observer):
     Attributes:
         title: which episode is played.
         phrases: what can be done and said.
+        briefing: what the player is told of the task.
         journal: gets everything that is played, before it is shown; None keeps nothing.
 
     Args:
         scenario: a path or a name.
+        briefing: None: what the scenario's file says.
 
     Raises:
         ScenarioError: the scenario has mistakes.
     """
 
-    def __init__(self, scenario: str) -> None:
+    def __init__(self, scenario: str, briefing: Briefing | None = None) -> None:
         loaded = load(scenario)
         self._stage = Stage(make(scenario), [self])
         self._env: ScenarioEnv = self._stage.env
         self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
-        self._about = _abouts(loaded, self._program)
+        self._text_view = TextView(self._program, "grid", colour=True)
+        self.briefing = brief(loaded) if briefing is None else briefing
         self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
         self.journal: Journal | None = None
@@ -168,15 +175,18 @@ class Game(Observer):
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
-        self._moments = [GameMoment(rooms.observations[AGENT]["image"][0], rooms.info.get("member"))]
+        image, info = rooms.observations[AGENT]["image"][0], rooms.info
+        self._moments = [GameMoment(image, self._seen(image, info), info.get("member"))]
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
         before, info, action = self.now, step.info, step.actions[AGENT][0]
+        image = rooms.observations[AGENT]["image"][0]
         words = describe_step(self._program, action, len(self._moments), info["utterance"])
         self._moments.append(
             GameMoment(
-                rooms.observations[AGENT]["image"][0],
+                image,
+                self._seen(image, info),
                 info.get("member"),
                 action,
                 (*before.lines, *words.dialogue),
@@ -195,9 +205,14 @@ class Game(Observer):
         return self._moments[-1]
 
     @property
-    def about(self) -> str:
-        """The description of the scenario that is played."""
-        return self._about.get(self.now.member, "")
+    def task(self) -> str:
+        """What the player is told of the task, in the words that language models read."""
+        return self._text_view.task(self.briefing.text(self.now.member))
+
+    @property
+    def explanation(self) -> str:
+        """How to read what is seen from the agent's seat."""
+        return self._text_view.explanation()
 
     @property
     def steps(self) -> int:
@@ -247,6 +262,9 @@ class Game(Observer):
         """Let the environment go."""
         self._env.close()
 
+    def _seen(self, image: NDArray[np.uint8], info: Mapping[str, Any]) -> str:
+        return self._text_view.observe({"image": image}, info)
+
     def _note(self, event: str, **more: Any) -> None:
         if self.journal is not None:
             self.journal.note(event, **more)
@@ -254,15 +272,6 @@ class Game(Observer):
     def _ended(self, info: Mapping[str, Any]) -> EpisodeEnd:
         name = outcome_name(info)
         return EpisodeEnd(name, bool(info["success"]), self._endings[name].text)
-
-
-def _abouts(loaded: Loaded, program: Playable) -> dict[str | None, str]:
-    """What each scenario says of itself, by the member it is; None is one that plays alone."""
-    if not isinstance(loaded, LoadedSuite):
-        return {None: loaded.scenario.about or ""}
-    assert isinstance(program, ProgramSuite), "internal: a suite compiles to a suite"
-    members = zip(program.members, loaded.members, strict=True)
-    return {name: member.scenario.about or "" for name, member in members}
 
 
 def _looks(state: dict[str, Any]) -> dict[str, str]:

@@ -18,7 +18,7 @@ from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.envs.view import ahead
-from socialai_dsl.play.game import FinishedEpisode, Game
+from socialai_dsl.play.game import FinishedEpisode, Game, Sight
 from socialai_dsl.render.canvas import INK
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.render.tiles import PALETTE
@@ -52,6 +52,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         game: what is played; its first episode has begun.
         episodes: which ones there are.
         practice: whether steps may be taken back, episodes begun again, and states of frames looked at.
+        view: whether the player sees what the agent sees, or the whole room.
 
     Returns, from `run`, the episodes that were played to their end.
 
@@ -70,6 +71,11 @@ class PlayApp(App[list[FinishedEpisode]]):
     #right { width: 1fr; height: 100%; }
     #sight { height: 9; border: round $foreground 40%; padding: 0 1; }
     .behind #sight { display: none; }
+    .seat #left, .seat #view { display: none; }
+    .seat #right { layout: horizontal; }
+    .seat #sight { width: 3fr; height: 100%; }
+    .seat #told { width: 2fr; height: 100%; }
+    .seat #facts { height: 100%; padding: 0; }
     #view { width: 15; height: 7; }
     #facts { width: 1fr; height: 7; padding-left: 1; }
     #told { height: 1fr; border: round $foreground 40%; }
@@ -100,10 +106,11 @@ class PlayApp(App[list[FinishedEpisode]]):
         Binding("ctrl+c", "quit", show=False, priority=True),
     ]
 
-    def __init__(self, game: Game, episodes: Episodes, practice: bool = True) -> None:
+    def __init__(self, game: Game, episodes: Episodes, practice: bool = True, view: Sight = "room") -> None:
         super().__init__()
         self.ansi_theme_dark = _TERMINAL
         self._game, self._episodes, self._practice = game, episodes, practice
+        self._is_seated = view == "seat"
         self._number = 0
         self._done: list[FinishedEpisode] = []
         self.failure: Exception | None = None
@@ -117,7 +124,8 @@ class PlayApp(App[list[FinishedEpisode]]):
             with Vertical(id="right"):
                 with Horizontal(id="sight"):
                     yield Static(id="view")
-                    yield Static(id="facts")
+                    with VerticalScroll(id="facts", can_focus=False):
+                        yield Static(id="fact")
                 with VerticalScroll(id="backstage", can_focus=False):
                     yield Static(id="states")
                 with VerticalScroll(id="told", can_focus=False):
@@ -128,9 +136,10 @@ class PlayApp(App[list[FinishedEpisode]]):
 
     def on_mount(self) -> None:
         """Bind the movements that there are, and show where the game stands."""
+        self.query_one("#middle").set_class(self._is_seated, "seat")
         self.query_one("#left").border_title = "room"
         self.query_one("#sight").border_title = "in view"
-        self.query_one("#told").border_title = "said and heard"
+        self.query_one("#told").border_title = "told, said and heard"
         self.query_one("#backstage").border_title = "behind the scenes"
         self.show()
 
@@ -244,13 +253,15 @@ class PlayApp(App[list[FinishedEpisode]]):
         self.show()
 
     def action_scroll_told(self, pages: int) -> None:
-        """Look at what was said before, or at more of what is behind the scenes."""
-        told = self.query_one("#backstage" if self.query_one("#right").has_class("behind") else "#told")
-        told.scroll_relative(y=pages * (told.size.height - 1), animate=False)
+        """Look at what was said before and at more of what is seen, or at more of what is behind the scenes."""
+        behind = self.query_one("#right").has_class("behind")
+        for part in self.query("#backstage" if behind else "#told, #facts"):
+            part.scroll_relative(y=pages * (part.size.height - 1), animate=False)
 
     def action_explain(self) -> None:
         """Show what the keys do and what the letters mean."""
-        self.push_screen(_Help(_help(self._game.phrases.actions, self._practice)))
+        reading = self._game.explanation if self._is_seated else _ROOM
+        self.push_screen(_Help(_help(self._game.phrases.actions, self._practice, reading)))
 
     def _handle_exception(self, error: Exception) -> None:
         """Leave the screen; whoever started it says what happened, as for every command."""
@@ -265,37 +276,48 @@ class PlayApp(App[list[FinishedEpisode]]):
     def show(self, message: str = "") -> None:
         """Show where the game stands."""
         game, now = self._game, self._game.now
-        member = f" · {now.member}" if now.member is not None else ""
-        self.query_one("#title", Static).update(
-            Text(printable(f"{game.title}{member} · step {game.steps} · reward {now.reward:.3f}"))
-        )
-        self.query_one("#room", Static).update(Text.from_ansi(game.room()))
-        view = game.view()
-        self.query_one("#view", Static).update(Text.from_ansi(view.text))
-        shown = "".join(f"\n{line}" for line in view.figures)
-        facts = Text.assemble(
-            "ahead: ", (ahead(now.view), "bold"), shown, "\n\n", (printable(game.about), "dim")
-        )
-        self.query_one("#facts", Static).update(facts)
+        parts = [game.title, f"step {game.steps}"]
+        if not self._is_seated:
+            parts[1:1] = [now.member] if now.member is not None else []
+            parts.append(f"reward {now.reward:.3f}")
+        self.query_one("#title", Static).update(Text(printable(" · ".join(parts))))
+        if self._is_seated:
+            self.query_one("#fact", Static).update(Text.from_ansi(now.seen))
+        else:
+            self._show_room()
         self._show_told()
         if self.query_one("#right").has_class("behind"):
             self.query_one("#states", Static).update(Text("\n".join(map(printable, game.backstage()))))
-        self._follow()
         if now.ended is None:
             self.tell(message)
             return
         verdict = "success" if now.ended.success else "no success"
+        after = f"after {game.steps} steps"
+        if not self._is_seated:
+            verdict, after = f"{verdict}: {now.ended.text}", f"{after}, reward {now.reward:.3f}"
         more = "n next · r again · u undo · q quit" if self._practice else "n next · q quit"
         self.tell(
-            f"{verdict}: {now.ended.text}\nafter {game.steps} steps, reward {now.reward:.3f}   {more}",
+            f"{verdict}\n{after}   {more}",
             "won" if now.ended.success else "lost",
         )
 
+    def _show_room(self) -> None:
+        """The whole room, and beside it what the agent sees."""
+        game, view = self._game, self._game.view()
+        self.query_one("#room", Static).update(Text.from_ansi(game.room()))
+        self.query_one("#view", Static).update(Text.from_ansi(view.text))
+        shown = "".join(f"\n{line}" for line in view.figures)
+        self.query_one("#fact", Static).update(
+            Text.assemble("ahead: ", (ahead(game.now.view), "bold"), shown)
+        )
+        self._follow()
+
     def _show_told(self) -> None:
-        lines = self._game.now.lines
-        texts = [self._line(line) for line in lines] or [Text("nothing yet", "dim")]
-        self.query_one("#lines", Static).update(Text("\n").join(texts))
-        self.call_after_refresh(self.query_one("#told").scroll_end, animate=False)
+        """What the player was told of the task, then what was said and heard."""
+        lines, told = self._game.now.lines, self.query_one("#told")
+        task = Text("\n".join(map(printable, self._game.task.split("\n"))), "italic")
+        self.query_one("#lines", Static).update(Text("\n").join([task, *map(self._line, lines)]))
+        self.call_after_refresh(told.scroll_end if lines else told.scroll_home, animate=False)
 
     def _line(self, line: DialogueLine) -> Text:
         name = printable(line.speaker) or "somebody"
@@ -482,8 +504,15 @@ def _key(movement: str) -> str:
     return _NAMES.get(first, first)
 
 
-def _help(actions: Sequence[str], practice: bool) -> str:
-    """What the keys do and what the letters mean."""
+_ROOM: Final = (
+    "In the room the agent is an arrow alone. Av is an NPC of kind A that looks down. Other things begin with their "
+    "colour, e for grey: gD is a closed green door, gL a locked one, g/ an open one. The lighter cells can be in view; "
+    "what the agent is given of them is on the right."
+)
+
+
+def _help(actions: Sequence[str], practice: bool, reading: str) -> str:
+    """What the keys do, and how to read the picture."""
     moves = [f"{' '.join(_NAMES.get(key, key) for key in _KEYS[name])} {name}" for name in actions]
     lines = [
         ", ".join([*moves, ". stand still"]),
@@ -492,7 +521,7 @@ def _help(actions: Sequence[str], practice: bool) -> str:
         "             . or none stands still",
         "             Tab completes what is begun, or puts in what was meant",
         "c            choose a sentence from lists",
-        "PgUp PgDn    what was said before",
+        "PgUp PgDn    what you were told, what was said before, more in view",
     ]
     if practice:
         lines += [
@@ -504,9 +533,6 @@ def _help(actions: Sequence[str], practice: bool) -> str:
         "n            the next episode",
         "q            quit",
         "",
-        "In the room the agent is an arrow alone. Av is an NPC of kind A that",
-        "looks down. Other things begin with their colour, e for grey: gD is a",
-        "closed green door, gL a locked one, g/ an open one. The lighter cells",
-        "can be in view; what the agent is given of them is on the right.",
+        reading,
     ]
     return escape("\n".join(lines))

@@ -44,6 +44,8 @@ from trainer.config import RunConfig, scenario_in
 
 _PLAYER: Final = ("greedy", "seed", "device", "net")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))
+_TOLD: Final = ("tell", "goal", "language")
+_OF_OTHERS: Final[dict[str, tuple[str, ...]]] = {"random": ("seed",), "human": ("view", *_TOLD)}
 RECORDED: Final = 3
 """The number of successes, and of failures, that an evaluation films."""
 
@@ -69,7 +71,8 @@ def evaluate(
             episodes and a list of all; reports take it. A language model and a person have one in any case.
         record: up to how many successes, and how many failures, are filmed there.
         options: of a trained agent `greedy`, `seed`, `device` and `net`, of `random` the `seed`; of a language model
-            those of `ModelOptions`.
+            those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`, see `Player`,
+            and of a person `view`.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -156,13 +159,15 @@ def made_player(
         refuse_unknown("evaluate", options, (), "; what you hand over plays as it is")
         return player_of(agent, scenarios[0] if scenarios else "")
     player = Player(str(agent), out=out)
-    known = _MODEL if player.is_model else {"random": ("seed",)}.get(player.agent, ())
+    known = (*_MODEL, *_TOLD) if player.is_model else _OF_OTHERS.get(player.agent, ())
     known = _PLAYER if player.is_trained else known
     refuse_unknown(f"the agent {player.agent!r}", {k: v for k, v in options.items() if k not in known}, known)
     if player.is_model:
-        return replace(player, options=ModelOptions(**options))
+        told = {name: value for name, value in options.items() if name in _TOLD}
+        asked = {name: value for name, value in options.items() if name not in _TOLD}
+        return replace(player, options=ModelOptions(**asked), **told)
     if player.is_person:
-        return replace(player, out=session_folder(out or HUMAN_FOLDER, who))
+        return replace(player, out=session_folder(out or HUMAN_FOLDER, who), **options)
     if not player.is_trained:
         return replace(player, **options)
     require_trainer()
@@ -187,6 +192,7 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "kind": player.kind,
         "greedy": player.greedy,
         "seed": player.seed,
+        **evaluation.granted,
         **more,
         "warnings": list(evaluation.warnings),
         "eval": evaluation.figures(),

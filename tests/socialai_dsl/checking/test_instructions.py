@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.authoring.formatting import formatted
+from socialai_dsl.checking.briefing import UNTOLD, Briefing, brief
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check
+from socialai_dsl.llm import Episode
 from socialai_dsl.source import Source
 
 SCENARIO = """\
@@ -19,7 +22,7 @@ horizon: 10
 grammar: {templates: [Say <noun>], nouns: [hello]}
 room: {size: 6}
 cast: {agent: {}}
-outcome: [{success: t == 5}]
+outcome: [{success: t >= 3}]
 """
 
 
@@ -105,3 +108,93 @@ def test_variants_and_bases(tmp_path: Path) -> None:
 def test_they_are_formatted() -> None:
     text = SCENARIO + "instructions:  {en:  Go there. ,de: |-\n   Geh.}\n".replace("|-\n   ", "")
     assert formatted(Source("walk.yaml", text)).endswith("instructions: {en: Go there., de: Geh.}\n")
+
+
+LANGUAGES = "instructions: {en: Go., de: Geh.}\n"
+
+
+@pytest.mark.parametrize(
+    ("instructions", "options", "expected"),
+    [
+        ("", {}, Briefing()),
+        (LANGUAGES, {}, Briefing("instructions", "Go.", "en")),
+        (LANGUAGES, {"language": "de"}, Briefing("instructions", "Geh.", "de")),
+        (LANGUAGES, {"tell": "nothing"}, Briefing()),
+        (LANGUAGES, {"goal": "Wait."}, Briefing("goal", "Wait.")),
+        ("instructions: Go.\n", {"tell": "instructions"}, Briefing("instructions", "Go.")),
+    ],
+)
+def test_what_is_told(tmp_path: Path, instructions: str, options: dict[str, Any], expected: Briefing) -> None:
+    assert brief(sd.load(written(tmp_path, instructions)), **options) == expected
+
+
+@pytest.mark.parametrize(
+    ("instructions", "options", "message"),
+    [
+        ("", {"tell": "all"}, "tell: got 'all', expected one of nothing, instructions, goal"),
+        (
+            "",
+            {"tell": "instructions"},
+            "tell: got 'instructions', but walk has none; expected nothing or goal",
+        ),
+        ("", {"tell": "goal"}, "goal: got '' and tell 'goal', expected a sentence about the aim"),
+        ("", {"goal": "  "}, "goal: got '  ' and tell 'goal', expected a sentence about the aim"),
+        ("", {"goal": "Go.", "tell": "nothing"}, "goal: got 'Go.' and tell 'nothing', expected none"),
+        ("", {"language": "de"}, "language: got 'de' and tell 'nothing', expected none"),
+        (LANGUAGES, {"language": "fr"}, "language: got 'fr', but the instructions of walk are in en, de"),
+        ("instructions: Go.\n", {"language": "en"}, "walk do not say in which language they are"),
+    ],
+)
+def test_what_cannot_be_told(
+    tmp_path: Path, instructions: str, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        brief(sd.load(written(tmp_path, instructions)), **options)
+
+
+def test_a_program_has_no_instructions(tmp_path: Path) -> None:
+    assert brief(None) == Briefing()
+    program = sd.compile(sd.load(written(tmp_path, LANGUAGES)))
+    assert Episode(program).briefing == Briefing()
+    with pytest.raises(ValueError, match="a program has none"):
+        brief(None, "instructions")
+
+
+def suite(folder: Path, more: str = "") -> str:
+    """Two members with instructions, and one without."""
+    written(folder, LANGUAGES)
+    (folder / "run.yaml").write_text("scenario: run\nextends: walk.yaml\ninstructions: {de: Lauf.}\n")
+    (folder / "rest.yaml").write_text(SCENARIO.replace("walk", "rest"))
+    path = folder / "all.yaml"
+    path.write_text(f"suite: all\nmembers: [walk.yaml, run.yaml, rest.yaml]\n{more}")
+    return str(path)
+
+
+def test_each_member_of_a_suite_has_its_own(tmp_path: Path) -> None:
+    loaded = sd.load(suite(tmp_path))
+    german = brief(loaded, language="de")
+    assert german.record() == {
+        "tell": "instructions",
+        "told": {"walk": "Geh.", "run": "Lauf."},
+        "language": "de",
+    }
+    assert (german.text("run"), german.text("rest"), german.text()) == ("Lauf.", UNTOLD, UNTOLD)
+    assert brief(loaded, goal="Wait.").text("rest") == "Wait."
+    episode = Episode(suite(tmp_path))
+    told = set()
+    for number in range(20):
+        episode.reset(test_episode=number)
+        told.add(episode.instructions.rpartition("at most. ")[2])
+    assert told == {"Go.", UNTOLD}
+
+
+def test_acts_tell_their_own_when_they_begin(tmp_path: Path) -> None:
+    german = brief(sd.load(suite(tmp_path)), language="de")
+    episode = Episode(suite(tmp_path, "draw: in_sequence\n"), briefing=german)
+    episode.reset(seed=0)
+    assert episode.instructions.endswith("Geh.")
+    turns = []
+    while not (turns and turns[-1].done):
+        turns.append(episode.step("Act: left"))
+    begun = {t: turn.text.partition("\n\n")[0] for t, turn in enumerate(turns) if "\n\n" in turn.text}
+    assert list(begun.values()) == ["Lauf.", UNTOLD]

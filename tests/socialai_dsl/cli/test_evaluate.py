@@ -125,6 +125,11 @@ def test_what_does_not_fit_is_refused_and_the_rest_is_kept(
         (["random", "--on", "help", "--record", "3"], "--record: expected --out DIR as well"),
         (["random", "--on", "help", "--seed", str(1 << 63)], "seed: got 9223372036854775808"),
         (["human", "--on", "help", "--json"], "--json: the agent 'human'"),
+        (["random", "--on", "help", "--tell", "nothing"], "--tell: the agent 'random' has no use for it"),
+        (["oracle", "--on", "help", "--goal", "Go."], "--goal: the agent 'oracle' has no use for it"),
+        (["runs/x", "--on", "help", "--language", "de"], "--language: the agent 'runs/x' has no use for it"),
+        (["llm:m", "--on", "help", "--view", "room"], "--view: the agent 'llm:m' has no use for it"),
+        (["human", "--on", "help", "--tell", "instructions"], "tell: got 'instructions', but help has none"),
     ],
 )
 def test_wrong_usage(arguments: list[str], message: str, capsys: Capture) -> None:

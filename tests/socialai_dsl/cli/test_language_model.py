@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl import load
+from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.cli.main import main
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
@@ -103,6 +104,18 @@ def test_a_model_that_knows_the_script_does_what_the_script_does(tmp_path: Path,
     assert f"{10 * replies:,} read and {2 * replies:,} written" in printed
 
 
+TOLD = """\
+scenario: told
+about: The hypothesis is not told.
+instructions: {en: Go., de: Geh.}
+horizon: 3
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 5}
+cast: {agent: {}}
+outcome: [{success: t == 2}]
+"""
+
+
 def test_a_request_holds_the_whole_episode_or_says_what_it_leaves_out(tmp_path: Path) -> None:
     with endpoint(lambda _: "Act: left") as stub:
         assert evaluate(stub.url, tmp_path / "whole", episodes=1) == 0
@@ -118,6 +131,11 @@ def test_a_request_holds_the_whole_episode_or_says_what_it_leaves_out(tmp_path: 
     last = stub.requests[-1]
     assert [message["role"] for message in last["messages"]] == ["system", *["user", "assistant"] * 2, "user"]
     assert last["messages"][0]["content"].endswith("Leave.")
+    assert {key: figures(tmp_path)[key] for key in ("tell", "told", "view")} == {
+        "tell": "goal",
+        "told": "Leave.",
+        "view": "seat",
+    }
     assert last["messages"][2]["content"] == "Act: left"
     lines = sum(text.count("\n") + 1 for text in whole[1:-6:2])
     told = f"(97 earlier turns are left out here, {lines} lines of what you saw and heard.)\n\n"
@@ -127,6 +145,41 @@ def test_a_request_holds_the_whole_episode_or_says_what_it_leaves_out(tmp_path: 
     records = transcript(tmp_path)
     assert len(records) == 100
     assert records[0]["reply"] == "Act: left"
+
+
+def test_instructions_are_told_in_a_language_and_recorded(tmp_path: Path, capsys: Capture) -> None:
+    """With other words, or none, the same folder holds other episodes."""
+    scenario = tmp_path / "told.yaml"
+    scenario.write_text(TOLD, encoding="utf-8")
+    told = {}
+    for name, options in (("own", []), ("german", ["--language", "de"]), ("nothing", ["--tell", "nothing"])):
+        with endpoint(lambda _: "Act: left") as stub:
+            command = [
+                "evaluate",
+                "llm:stub",
+                "--base-url",
+                stub.url,
+                "--on",
+                str(scenario),
+                "--episodes",
+                "1",
+            ]
+            assert main([*command, "--out", str(tmp_path / name), *options]) == 0
+        result = json.loads((tmp_path / name / "told" / "result.json").read_text(encoding="utf-8"))
+        settings = json.loads((tmp_path / name / "told" / "transcripts" / "settings.json").read_text("utf-8"))
+        told[name] = {key: result[key] for key in ("tell", "told", "language") if key in result}
+        assert told[name] == {key: settings[key] for key in ("tell", "told", "language") if key in settings}
+        system = stub.requests[0]["messages"][0]["content"]
+        assert system.endswith(f"An episode lasts 3 turns at most. {told[name].get('told', UNTOLD)}")
+        assert "hypothesis" not in system
+    assert told == {
+        "own": {"tell": "instructions", "told": "Go.", "language": "en"},
+        "german": {"tell": "instructions", "told": "Geh.", "language": "de"},
+        "nothing": {"tell": "nothing"},
+    }
+    capsys.readouterr()
+    assert main([*command, "--out", str(tmp_path / "own"), "--language", "de"]) == 2
+    assert "language, told; choose another folder" in capsys.readouterr().err
 
 
 def test_json_and_tools(tmp_path: Path) -> None:
@@ -427,7 +480,7 @@ def test_the_key_is_sent_and_appears_nowhere(tmp_path: Path, capsys: Capture, ca
         (["--budget", "much"], "--budget: got 'much', expected an amount such as 200000 or 2.50usd"),
         (["--base-url", "http://127.0.0.1:99999/v1"], "--base-url: got 'http://127.0.0.1:99999/v1'"),
         (["--base-url", "http://[::1"], "--base-url: got 'http://[::1'"),
-        (["--goal", "\udcff"], "--goal: got '\\udcff', expected a text in Unicode"),
+        (["--goal", "\udcff"], "goal: got '\\udcff', expected a text in Unicode"),
         (["--budget", "1usd"], "--budget: an amount of money needs --prices"),
         (["--prices", "1"], "--prices: got '1', expected two amounts such as 0.15,0.60"),
     ],

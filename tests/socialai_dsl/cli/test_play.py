@@ -24,9 +24,16 @@ import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.view import ahead
-from socialai_dsl.play.game import Game
+from socialai_dsl.play.game import Game, Sight
 from socialai_dsl.play.screen import PlayApp
 
+BARE = """\
+horizon: 9
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 6}
+cast: {agent: {}}
+outcome: [{success: t == 5}]
+"""
 SEED = 0
 ROWS, COLUMNS = 24, 80
 ARROWS = {"left": "\x1b[D", "right": "\x1b[C", "forward": "\x1b[A"}
@@ -127,7 +134,8 @@ def test_talkitout_is_played_to_success_in_a_terminal(
     steps = script("talkitout", SEED)
     screen = terminal("play", "talkitout", "--seed", str(SEED), "--out", str(tmp_path))
     first = screen.shows("step 0 ", "q quit")
-    assert "Leave by the right one" in first
+    assert "Leave by the right one" not in first, "that is for authors"
+    assert "An episode lasts 100 turns at most" in first
 
     # A step too many, and back; the states of frames shown, and hidden.
     screen.press(ARROWS["left"])
@@ -189,7 +197,7 @@ def test_what_was_played_survives_whatever_ends_the_terminal(
         screen = terminal("evaluate", "human", "--on", "talkitout", "--participant", participant, *out)
         screen.shows("test episode 0", "step 0 ")
         screen.press("x")
-        screen.shows("no success:")
+        screen.shows("no success")
         screen.press("n")
         screen.shows("test episode 1")
         screen.press(ARROWS["left"])
@@ -211,6 +219,7 @@ def test_what_was_played_survives_whatever_ends_the_terminal(
             session.name,
             "talkitout",
         )
+        assert (first["tell"], first["view"], first["practice"]) == ("nothing", "seat", False)
         kinds = [event["event"] for event in played]
         assert kinds == ["episode", "step", "end", "episode", "step"]
         assert (played[2]["success"], played[4]["did"]) == (False, "left")
@@ -243,11 +252,12 @@ def played(
     player: Callable[[PlayApp, Pilot[Any]], Any],
     practice: bool = True,
     episodes: Any = episode,
+    view: Sight = "room",
 ) -> PlayApp:
     """Let a function play on a screen of 80x24."""
     game = Game(scenario)
     game.begin(*episodes(0))
-    app = PlayApp(game, episodes, practice)
+    app = PlayApp(game, episodes, practice, view)
 
     async def run() -> None:
         async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
@@ -349,15 +359,42 @@ def test_an_evaluation_gives_nothing_away() -> None:
     assert [one.title for one in app.return_value or []] == ["test episode 0", "test episode 1"]
 
 
-def test_members_of_a_suite_say_what_they_are_about() -> None:
+def test_players_of_a_suite_are_told_the_instructions_of_its_member(tmp_path: Path) -> None:
+    for name, instructions in (("walk", "Walk on."), ("wait", "Wait here.")):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"scenario: {name}\nabout: Nobody is told this.\ninstructions: {instructions}\n{BARE}"
+        )
+    (tmp_path / "both.yaml").write_text("suite: both\nmembers: [walk.yaml, wait.yaml]\n")
+
     async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
-        told = {shown(app, "#facts")}
+        told = {shown(app, "#lines")}
         for _ in range(6):
             await pilot.press("n")
-            told.add(shown(app, "#facts"))
-        assert len(told) > 2
+            told.add(shown(app, "#lines"))
+        turns = "An episode lasts 9 turns at most."
+        assert told == {f"{turns} Walk on.", f"{turns} Wait here."}
 
-    played("social_env", play)
+    played(str(tmp_path / "both.yaml"), play)
+
+
+def test_the_view_of_the_seat_is_that_of_a_model_and_nothing_else() -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        await pilot.press("up", "left")
+        seen = shown(app, "#fact")
+        assert seen == re.sub(r"\x1b\[[0-9;]*m", "", app._game.now.seen)
+        assert seen.startswith("You see:\n")
+        assert seen.endswith("You hear nothing.")
+        assert not app.query_one("#left").display
+        assert shown(app, "#room") == ""
+        assert shown(app, "#title") == "seed 0 · step 2"
+        await pilot.press("question_mark")
+        assert "Directions of others are those of a compass" in str(
+            app.screen.query_one("#help", Static).render()
+        )
+        await pilot.press("z", "x")
+        assert shown(app, "#message").split("   ")[0] == "no success\nafter 3 steps"
+
+    played("talkitout", play, practice=False, view="seat")
 
 
 def test_a_room_that_cannot_be_and_what_is_our_fault(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -42,6 +43,7 @@ HANDS = Path(__file__).parents[2] / "data" / "hands"
 AIMS = str(Path(__file__).parents[3] / "docs" / "cookbook" / "pointing_at_a_cell.yaml")
 NAMES += [AIMS, f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml", f"{HANDS.parent / 'looks'}.yaml"]
 STEPS, TILE, EDGE = 60, 32, 3
+COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _ROOM = 348
 """So many columns of a film show the room."""
 FORWARD = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -121,12 +123,12 @@ def test_pictures_of_cells_that_differ_for_the_agent_differ(name: str) -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", one_in(20, NAMES, "plays every scenario in three views"))
+@pytest.mark.parametrize("name", one_in(20, NAMES, "plays every scenario in four views"))
 def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
-    """What `render` prints, what a trace shows, and what a player has on the screen."""
+    """What `render` prints, what a trace shows, what a player has on the screen, and on that of the agent's view."""
     game = Game(name)
     env = game._env
-    shown: list[dict[str, bytes]] = [{}, {}, {}]
+    shown: list[dict[str, bytes]] = [{}, {}, {}, {}]
     for seed in range(3):
         game.begin("", {"seed": seed})
         for _, action in zip(range(STEPS), acting(env, seed), strict=False):
@@ -136,6 +138,7 @@ def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
                 frame(env._table, 0, "ansi"),
                 "\n".join([env.plain_text(), *present(cast_of(env.playing), env.describe())]),
                 "\n".join([game.room(), view.text, *view.figures]),
+                COLOURS.sub("", game.now.seen).partition("\nYou hear")[0],
             ]
             for known, text in zip(shown, texts, strict=True):
                 assert known.setdefault(text, image) == image, f"not told apart:\n{text}"

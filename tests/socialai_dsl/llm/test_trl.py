@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.llm import ActionLanguage, Episode
 from socialai_dsl.llm.episode import scripted_reply
 from socialai_dsl.llm.trl import social_env
@@ -49,6 +50,18 @@ def calls_of(language: ActionLanguage, reply: str) -> list[tuple[str, dict[str, 
             if template.replace("<noun>", noun) == action.sentence:
                 return [("say", {"template": template, "noun": noun, **direction})]
     raise AssertionError(action)
+
+
+def test_what_is_told_of_the_task(signal: Path) -> None:
+    signal.write_text(SIGNAL + "instructions: {en: Give a signal., de: Gib ein Zeichen.}\n", encoding="utf-8")
+    for told, options in {
+        "Give a signal.": {},
+        "Gib ein Zeichen.": {"language": "de"},
+        "Wink.": {"goal": "Wink."},
+        UNTOLD: {"tell": "nothing"},
+    }.items():
+        text = social_env(signal, **options)().reset(seed=0)  # type: ignore[arg-type]
+        assert f"An episode lasts 3 turns at most. {told}\n\nYou see" in text
 
 
 @pytest.mark.parametrize("scenario", ["talkitout", "dance", "school/boxes+pointing", "novel/sally_anne"])
