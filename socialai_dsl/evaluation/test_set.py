@@ -68,6 +68,11 @@ class Evaluation:
     kept: str | None = None
     briefing: Briefing = NO_BRIEFING
 
+    @property
+    def granted(self) -> dict[str, Any]:
+        """What the player was told and saw, as results record it."""
+        return {**self.briefing.record(), "view": self.player.view}
+
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
         result = self.result
