@@ -7,8 +7,8 @@ The public surface, imported on first use so that checking a file loads neither 
 * `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
 * `train(scenario, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
-* `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)` and `trace(scenario)` do what the commands
-  do, with every kind of agent, and return objects.
+* `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)`, `trace(scenario)` and `report(folders)` do
+  what the commands do, with every kind of agent.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
 """
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from socialai_dsl.runs.folder import Run
     from socialai_dsl.runs.recordings import record
     from socialai_dsl.runs.replay import replay
+    from socialai_dsl.runs.report import report
     from socialai_dsl.runs.train import Progress, resume, train
 
 __version__ = "0.1.0"
@@ -55,6 +56,7 @@ _HOME = {
     "evaluate": ("socialai_dsl.runs.evaluate", "evaluate"),
     "record": ("socialai_dsl.runs.recordings", "record"),
     "replay": ("socialai_dsl.runs.replay", "replay"),
+    "report": ("socialai_dsl.runs.report", "report"),
     "trace": ("socialai_dsl.episodes.traces", "trace"),
     "ScenarioError": ("socialai_dsl.diagnostics", "ScenarioError"),
     "Diagnostic": ("socialai_dsl.diagnostics", "Diagnostic"),
@@ -79,6 +81,7 @@ __all__ = [
     "make_vec",
     "record",
     "replay",
+    "report",
     "resume",
     "trace",
     "train",

@@ -1,0 +1,118 @@
+"""A page about an experiment or about single runs and evaluations, with figures and tables."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from socialai_dsl.atomic import write_text
+from socialai_dsl.episodes.players import require_trainer
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.levels import read_baselines, update_baselines
+from socialai_dsl.experiments.folder import EXPERIMENT
+from socialai_dsl.runs.folder import only_writer
+
+if TYPE_CHECKING:  # these load pandas and Matplotlib, which are only there if reports were asked for
+    from socialai_dsl.baselines import Baselines
+    from socialai_dsl.reporting.analysis import Analysis
+    from socialai_dsl.reporting.collect import Experiment
+
+PAGE: Final = "index.html"
+FIGURES: Final = "figures"
+FOLDER: Final = "report"
+BASELINES: Final = "baselines.json"
+
+
+def report(
+    folders: str | Path | Sequence[str | Path],
+    out: str | Path | None = None,
+    *,
+    baselines: bool = True,
+    tell: Callable[[str], None] = lambda line: None,
+) -> Path:
+    """Write a page about runs and evaluations of every kind of player, as `socialai report` does.
+
+    Args:
+        folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`.
+        out: folder to write (default: `report` in the experiment's folder, or here for runs).
+        baselines: whether script, chance and success without NPCs are measured; otherwise only what is known is shown.
+        tell: takes a line before each scenario that is measured.
+
+    Returns:
+        The page, which needs nothing outside the folder.
+
+    Raises:
+        UsageError: a folder is not what was expected, or a library is missing (a ValueError).
+        OSError: a file cannot be read or written.
+    """
+    require_libraries()
+    from socialai_dsl.reporting.analysis import analyse
+
+    named = [folders] if isinstance(folders, str | Path) else list(folders)
+    experiment, place = _experiment([Path(folder) for folder in named])
+    there = place / FOLDER if out is None else Path(out)
+    with only_writer(there):
+        measured, notes = _baselines(experiment, there / BASELINES, baselines, tell)
+        _write(analyse(experiment, measured, notes), there)
+    return there / PAGE
+
+
+def require_libraries() -> None:
+    """Say how to install what reports need, if it is missing.
+
+    Raises:
+        UsageError: a library is not installed.
+    """
+    try:
+        import jinja2  # noqa: F401
+        import matplotlib  # noqa: F401
+        import pandas  # noqa: F401
+        import scipy  # noqa: F401
+    except ImportError as error:
+        raise UsageError(f"reports need {error.name}: pip install 'socialai-dsl[report]'") from None
+
+
+def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
+    """What the folders hold, and where its report belongs."""
+    from socialai_dsl.reporting.collect import read_experiment, read_runs
+
+    try:
+        if len(folders) == 1 and (folders[0] / EXPERIMENT).exists():
+            return read_experiment(folders[0]), folders[0]
+        return read_runs(folders), Path()
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def _baselines(
+    experiment: Experiment, file: Path, measures: bool, tell: Callable[[str], None]
+) -> tuple[dict[str, Baselines], list[str]]:
+    """Baselines by scenario, from an earlier report or measured now, and remarks."""
+    if not measures:
+        return read_baselines(file), []
+    require_trainer()
+    return update_baselines(experiment.scenarios, file, tell)
+
+
+def _write(analysis: Analysis, out: Path) -> None:
+    from socialai_dsl.reporting.analysis import tables
+    from socialai_dsl.reporting.page import render_page
+    from socialai_dsl.reporting.plots import figures
+    from socialai_dsl.reporting.style import saved
+
+    folder = out / FIGURES
+    folder.mkdir(exist_ok=True)
+    drawings = {}
+    for name, figure in figures(analysis).items():
+        drawings[name] = saved(figure, "svg")
+        (folder / f"{name}.svg").write_bytes(drawings[name])
+        (folder / f"{name}.png").write_bytes(saved(figure, "png"))
+    for name, table in tables(analysis).items():
+        write_text(out / f"{name}.csv", table.to_csv(index=False) if len(table) else "")
+        if len(table) and importlib.util.find_spec("pyarrow") is not None:
+            table.to_parquet(out / f"{name}.parquet")
+    page = render_page(analysis, drawings, version("socialai-dsl"), out)
+    write_text(out / PAGE, page)  # last, so that its presence means a whole report
