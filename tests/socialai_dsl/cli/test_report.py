@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.baselines import Baselines
-from socialai_dsl.cli import report
 from socialai_dsl.cli.main import main
 from socialai_dsl.evaluation import levels
 from socialai_dsl.evaluation.levels import baselines as levels_of
 from socialai_dsl.reporting.analysis import analyse
 from socialai_dsl.reporting.collect import read_experiment
+from socialai_dsl.runs.report import BASELINES, FOLDER
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run
 
 Capture = pytest.CaptureFixture[str]
@@ -44,7 +44,7 @@ def test_baselines_are_measured_once(folder: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(levels, "baselines", lambda scenario: levels_of(scenario, episodes=10, rooms=2))
     assert main(["report", str(folder)]) == 0
     assert "help: playing the script, at random, and without NPCs" in capsys.readouterr().err
-    file = folder / "report" / report.BASELINES
+    file = folder / "report" / BASELINES
     measured = json.loads(file.read_text())["help"]
     assert measured["script"]["value"] == 1.0
     assert measured["chance"]["sample"] == "10 test episodes"
@@ -95,4 +95,4 @@ def test_what_is_no_experiment_is_said(
         (tmp_path / "experiment.json").write_text(content)
     assert main(["report", str(tmp_path)]) == 2
     assert message in capsys.readouterr().err
-    assert not (tmp_path / report.FOLDER).exists()
+    assert not (tmp_path / FOLDER).exists()

@@ -169,14 +169,14 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
 
     lost = until(lambda: cluster.under_way(killed.id, second=True), 600)
     cluster.remove()
-    until(lambda: lost.shown_status().state == "waiting", 300)
+    until(lambda: lost.shown_status.state == "waiting", 300)
     cluster.add()
 
     until(lambda: [run for run in runs_in(cluster.out) if run.status.state == "done"], 600)
     orphaned = until(lambda: cluster.under_way(killed.id, lost.id), 600)
     driver.kill()
     driver.wait()
-    until(lambda: orphaned.shown_status().state == "waiting", 300)
+    until(lambda: orphaned.shown_status.state == "waiting", 300)
     ends = {run.id: run.status.attempts for run in runs_in(cluster.out) if run.status.state == "done"}
 
     again = cluster.start()
