@@ -144,6 +144,10 @@ class TextView:
             parts.append("All other cells are empty.")
         return " ".join(parts)
 
+    def by_compass(self, info: Mapping[str, Any]) -> bool:
+        """Whether directions of NPCs are those of a compass in what is played; if not, they are seen from the agent."""
+        return self._directions(info) is COMPASS
+
     def _directions(self, info: Mapping[str, Any]) -> tuple[str, ...]:
         """The words for directions of NPCs; only the members of a mixed suite differ in them."""
         egocentric = self._egocentric

@@ -246,12 +246,28 @@ class Finding(BaseModel):
     error: bool
 
 
+class Seat(BaseModel):
+    """What whoever plays gets, and nothing else.
+
+    Attributes:
+        told: of the task. seen: what is seen and heard, as a language model reads it.
+        compass: whether directions of others are those of a compass.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    told: str
+    seen: str
+    compass: bool
+
+
 class _Begun(_Message):
     trace: Trace
     phrases: dict[str, list[str]]
     rules: list[str]
     player: str
     seed: int
+    seat: Seat
 
 
 class Drawn(_Message):
@@ -265,6 +281,7 @@ class Drawn(_Message):
     rules: list[str] | None = None
     player: str | None = None
     seed: int | None = None
+    seat: Seat | None = None
 
 
 class Begun(_Begun):
@@ -281,10 +298,11 @@ class Placed(_Begun):
 
 
 class Stepped(_Message):
-    """What a step adds to the trace."""
+    """What a step adds to the trace, and what is seen after it."""
 
     do: Literal["act", "auto"]
     more: Trace
+    seat: Seat
 
 
 class WentBack(_Message):

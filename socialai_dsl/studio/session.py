@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.briefing import NO_BRIEFING, brief
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
@@ -22,6 +23,7 @@ from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.episodes.traces import Tracing, thought_of
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
+from socialai_dsl.llm.view import TextView
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.endings import endings_of
@@ -49,6 +51,8 @@ class Session:
         self._texts: dict[Path, Source] = {}
         self._game: tuple[Stage, Tracing] | None = None
         self._phrases = Phrases((), Sentences((), (), ()))
+        self._text_view: TextView | None = None
+        self._briefing = NO_BRIEFING
         self._player, self._seed = "me", 0
         self._policy: Policy = RandomPolicy(())
         self._prepared = False
@@ -97,6 +101,7 @@ class Session:
             "rules": list(stage.env.counters()["rules"]),
             "player": self._player,
             "seed": seed,
+            "seat": self._seat(),
         }
 
     def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
@@ -221,6 +226,7 @@ class Session:
         program = compile_loaded(loaded)
         env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
         self._phrases = Phrases(program.actions, program.sentences)
+        self._text_view, self._briefing = TextView(program, "grid"), brief(loaded)
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
         tracing = Tracing(Tracer(env, loaded.name, "me", endings, about_of(loaded)))
         self._game = Stage(env, [tracing]), tracing
@@ -264,7 +270,19 @@ class Session:
         except (ValueError, RoomError) as error:
             who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
-        return {"more": tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)}
+        more = tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)
+        return {"more": more, "seat": self._seat()}
+
+    def _seat(self) -> Reply:
+        """What whoever plays is told, sees and hears, as a language model reads it."""
+        stage, _ = self._playing()
+        assert self._text_view is not None, "internal: what is played has a view"
+        observation = {name: value[0] for name, value in stage.observations[AGENT].items()}
+        return {
+            "told": self._text_view.task(self._briefing.text(stage.info.get("member"))),
+            "seen": self._text_view.observe(observation, stage.info),
+            "compass": self._text_view.by_compass(stage.info),
+        }
 
 
 ASKED: Final[Mapping[str, Callable[..., Reply]]] = {

@@ -18,6 +18,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import run_main
+from socialai_dsl.llm import Episode, TextView
 
 pytest.importorskip("starlette", reason="no test of the studio without the extra `studio`")
 
@@ -312,6 +313,25 @@ def test_talkitout_is_played_stepped_back_and_ends_elsewhere(studio: Page, tmp_p
     replay.goto(page.as_uri())
     replay.get_by_label("step", exact=True).fill("4")
     assert replay.locator(".controls output").inner_text().startswith("step 4 of ")
+
+
+def test_as_the_agent_sees_it_there_is_no_room(studio: Page) -> None:
+    begin(studio, SEED)
+    studio.get_by_label("as the agent sees it").check()
+    beside = Episode("talkitout")
+    seen = studio.locator(".seat pre")
+    assert (
+        seen.text_content() == f"{TextView(beside.env.program, 'grid').observe(*beside.env.reset(seed=SEED))}"
+    )
+    assert "An episode lasts 100 turns at most" in studio.locator(".seat p").inner_text()
+    for hidden in (".stage", ".cast", ".why", ".counts", ".writing", ".sight"):
+        assert not studio.locator(hidden).first.is_visible()
+    studio.keyboard.press("x")
+    studio.locator(".message.bad", has_text="✗ no success").wait_for()
+    assert studio.locator(".controls output").inner_text() == "step 1"
+    studio.get_by_label("as the agent sees it").uncheck()
+    studio.locator(".message.bad", has_text="✗ failure").wait_for()
+    assert studio.locator(".stage").is_visible()
 
 
 def free_cell(page: Page) -> tuple[int, int]:

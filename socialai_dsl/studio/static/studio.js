@@ -3,12 +3,15 @@
 import { make, panel } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
+import { drawPicture } from "./room.js";
+import { NPC } from "./tiles.js";
 import { Episode, slotsOf } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
 
 const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450, TRY_EVERY = 1000;
 const LARGEST_MESSAGE = 2 << 20;
+const MARBLE = 16;
 const LOST = "the connection to the studio was lost; what you type stays in this window, which goes on when `socialai studio` runs again at this address";
 /** @type {Record<string, string>} */
 const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
@@ -132,6 +135,38 @@ class Counts {
   }
 }
 
+/** The view with directions as the observation has them: where they are those of a compass, the agent's own is not given.
+ * @param {import("./trace.js").Picture} view @param {number} facing where the agent looks @param {boolean} compass
+ * @returns {import("./trace.js").Picture} */
+function observed(view, facing, compass) {
+  const turned = (/** @type {number} */ drawn) => (drawn + facing + 1) % 4;
+  const turns = (/** @type {number} */ type) => type === MARBLE || (type === NPC && compass);
+  const cells = view.cells.map(([type, colour, status, drawn]) =>
+    /** @type {import("./trace.js").Look} */ ([type, colour, status, turns(type) ? turned(drawn) : drawn]));
+  const gestures = new Map([...view.gestures].map(([cell, one]) =>
+    [cell, compass && one.pointing >= 0 ? { ...one, pointing: turned(one.pointing) } : one]));
+  return { ...view, cells, gestures };
+}
+
+/** What a person on the agent's seat gets, and nothing else. */
+class Seat {
+  constructor() {
+    this.told = make("p");
+    this.canvas = make("canvas", { role: "img", "aria-label": "what the agent sees, 7 by 7 cells; the agent looks up" });
+    this.seen = make("pre", { "aria-live": "polite" });
+    this.root = panel("As the agent sees it", "seat", this.told, this.canvas, this.seen);
+    /** @type {{told: string, seen: string, compass: boolean}[]} of each moment */ this.moments = [];
+  }
+
+  /** @param {Episode} episode @param {number} step */
+  show(episode, step) {
+    const { told, seen, compass } = this.moments[step], { view, moment } = episode.scenes[step];
+    drawPicture(this.canvas, observed(view, moment.agent[2], compass), { tile: 64 });
+    this.told.textContent = told;
+    this.seen.textContent = seen;
+  }
+}
+
 class Studio {
   constructor() {
     const { root = "", open = "" } = document.body.dataset;
@@ -151,8 +186,9 @@ class Studio {
     const goTo = (/** @type {string} */ at) => this.editorAt(at);
     this.stage = new Stage();
     this.counts = new Counts(goTo);
+    this.seat = new Seat();
     const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: new Sight(), counts: this.counts, mind: new Mind((step) => this.back(step)) };
-    this.parts = [this.stage, ...Object.values(parts)];
+    this.parts = [this.stage, this.seat, ...Object.values(parts)];
     this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
     this.state = make("output", { class: "quiet", "aria-live": "polite" });
     /** @type {Reply[]} drafts that no window shows */ this.others = [];
@@ -162,6 +198,7 @@ class Studio {
     this.title = make("h1", {}, "studio");
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.begin(Number(this.seedField.value)) });
     this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin(this.seed) });
+    this.seated = make("input", { type: "checkbox", onchange: () => this.sit() });
     this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
     this.count = make("output", {});
     this.thing = make("select", { "aria-label": "thing to move", onchange: () => this.moving(null) });
@@ -200,7 +237,8 @@ class Studio {
       button("⟲ again", () => this.begin(this.seed), "begin the episode again (R)"),
       button("Another room", () => this.begin(this.seed + 1), "the next seed (N)"), make("label", {}, "seed ", this.seedField),
       button("◂ step back", () => this.back(this.length - 1), "take the last step back, chance included (U)"), this.count,
-      make("label", {}, "plays: ", this.players), this.watch,
+      make("label", {}, "plays: ", this.players),
+      make("label", { title: "hide the room, the states, the rules and the text" }, this.seated, " as the agent sees it"), this.watch,
       button("one step", () => this.auto(), "let whoever plays do one step"));
     const say = make("form", { class: "controls say", onsubmit: (/** @type {Event} */ event) => this.submit(event) },
       this.template, this.words, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
@@ -212,7 +250,7 @@ class Studio {
       make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
     return make("div", { class: "studio" }, bar,
       make("section", { class: "writing", "aria-label": "scenario" }, this.pane, this.findings),
-      make("main", {}, this.stage.root, this.message, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root), check),
+      make("main", {}, this.stage.root, this.seat.root, this.message, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root), check),
       make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
   }
 
@@ -434,6 +472,7 @@ class Studio {
   take(begun) {
     if (this.episode) this.counts.keep(this.episode);
     this.episode = new Episode(begun.trace);
+    this.seat.moments = [begun.seat];
     this.counts.names = begun.rules;
     this.length = 0;
     this.seed = begun.seed;
@@ -484,6 +523,7 @@ class Studio {
     }
     this.tell("");
     this.episode?.add(done.more);
+    this.seat.moments.push(done.seat);
     this.length = this.episode?.length ?? 0;
     this.show();
     return true;
@@ -496,6 +536,7 @@ class Studio {
     const done = await this.line.ask("back", { to: step });
     if (done.refused) return this.tell(done.refused);
     this.episode?.cut(step);
+    this.seat.moments.length = step + 1;
     this.length = step;
     this.tell("");
     this.show();
@@ -630,6 +671,14 @@ class Studio {
     URL.revokeObjectURL(link.href);
   }
 
+  /** Show what the agent sees, or all again; keys play on. */
+  sit() {
+    this.seated.blur();
+    this.moving(null);
+    this.tell("");
+    this.show();
+  }
+
   shade() {
     const root = document.documentElement, dark = matchMedia("(prefers-color-scheme: dark)").matches;
     const now = root.style.colorScheme || (dark ? "dark" : "light");
@@ -690,9 +739,12 @@ class Studio {
   show() {
     const { episode, length } = this;
     if (!episode) return;
-    const { ended } = episode;
-    this.count.textContent = `step ${length} · reward ${episode.scenes[length].reward.toFixed(3)}`;
-    if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${outcomeInWords(ended)}`);
+    const { ended } = episode, own = this.players.value === "me";
+    this.seated.disabled = !own;
+    const seated = own && this.seated.checked;
+    this.root.classList.toggle("seated", seated);
+    this.count.textContent = `step ${length}${seated ? "" : ` · reward ${episode.scenes[length].reward.toFixed(3)}`}`;
+    if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${seated ? (ended.success ? "success" : "no success") : outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
     for (const part of this.parts) part.show(episode, length);
   }

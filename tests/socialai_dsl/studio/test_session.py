@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.episodes.play import AGENT
+from socialai_dsl.llm import Episode
 from socialai_dsl.studio.session import RefusalError, Session
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -43,6 +46,43 @@ def test_mistakes_have_a_place_and_leave_no_room(path: Path) -> None:
     assert "trace" not in drawn
     assert (drawn["findings"][0]["line"], drawn["findings"][0]["error"]) == (7, True)
     assert "horizon" in drawn["findings"][0]["message"]
+
+
+def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path: Path) -> None:
+    """The scenario's `about` is not told, its instructions are."""
+    model = Episode(str(path), "grid")
+    for told in (UNTOLD, "Ask."):
+        if told == "Ask.":
+            session.draw(str(path), path.read_text() + "instructions: {en: Ask., de: Frag.}\n", 3)
+        seat = session.begin(3)["seat"]
+        assert seat["seen"] == model.reset(3)
+        assert seat["told"] == f"An episode lasts 100 turns at most. {told}"
+        assert seat["compass"]
+        for movement in ("left", "forward", "left"):
+            assert session.act(movement)["seat"]["seen"] == model.step(f"Act: {movement}").text
+
+
+@pytest.mark.parametrize("name", ["talkitout", "school/boxes+pointing", "school/marbles"])
+def test_a_page_finds_the_directions_of_the_observation_again(name: str) -> None:
+    """In its picture directions are turned as on a screen; `observed` of the page turns them back."""
+    session = Session()
+    session._use(sd.load(name))
+    stage, tracing = session._playing()
+    stage.begin({"seed": 0})
+    random, looks = np.random.default_rng(0), list[list[int]]()
+    for _ in range(40):
+        trace = tracing.tracer.trace()
+        looks, view = trace.looks, next(one.view for one in reversed(trace.moments) if one.view is not None)
+        image = stage.observations[AGENT]["image"][0]
+        facing, compass = trace.moments[-1].agent[2], session._seat()["compass"]
+        for cell, number in enumerate(view):
+            kind, _, _, drawn = looks[number]
+            turned = (drawn + facing + 1) % 4 if kind == 16 or (kind == 11 and compass) else drawn
+            if cell != 45:  # where the agent stands is what it carries
+                assert turned == image[cell % 7, cell // 7, 3] or (kind == 11 and not compass)
+        if not stage.running.all():
+            break
+        stage.step({AGENT: random.integers(0, stage.action_sizes, dtype=np.int64)[None]})
 
 
 def test_steps_are_taken_back_with_their_chance(session: Session) -> None:
