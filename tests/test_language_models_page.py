@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.llm import Episode
 from tests.socialai_dsl.llm.endpoint import endpoint
 from tests.socialai_dsl.reporting.page_reader import Page
 
@@ -50,6 +51,17 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     assert pairing[2:5] == ["20", "20", "0"]
     assert pairing[5].startswith("+1.000 [")
     assert ["help / llm:qwen3-8b", "20", "20", "0.0%", "200", "40", "–"] in report.table("replies")
+
+
+def test_the_page_shows_the_first_observation(update_goldens: bool) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    begun, rest = page.split("The first observation:\n\n```text\n")
+    shown, _, rest = rest.partition("```")
+    text = Episode("talkitout").reset(test_episode=0) + "\n"
+    if update_goldens:
+        PAGE.write_text(f"{begun}The first observation:\n\n```text\n{text}```{rest}", encoding="utf-8")
+        shown = text
+    assert shown == text, "if the new text is meant, run pytest --update-goldens"
 
 
 @pytest.mark.thorough("plays many episodes in text")

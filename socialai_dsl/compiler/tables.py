@@ -154,6 +154,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         source_map=tuple(code.spans),
         labels=dict(code.labels),
         looks=tuple((look.name, look.words) for look in shown),
+        names_shown=checked.names_shown,
     )
 
 

@@ -87,6 +87,7 @@ def let_a_model_play(
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
     from socialai_dsl.llm.endpoint import EndpointError
     from socialai_dsl.llm.players import LanguageModelPlayer, Manner, OtherSettings, transcripts
+    from socialai_dsl.llm.view import TextView
 
     endpoint = _endpoint(agent, options)
     manner = Manner(**{field.name: getattr(options, field.name) for field in fields(Manner)})
@@ -118,7 +119,7 @@ def let_a_model_play(
             f"the budget is spent: {ended} of {episodes} episodes are over; the same command goes on with "
             f"another {options.budget}"
         )
-    return _outcome(played, program, _probes(played, names))
+    return _outcome(played, program, {"text": TextView.version} | _probes(played, names))
 
 
 def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:

@@ -2,6 +2,6 @@
 
 from socialai_dsl.llm.actions import Action, ActionLanguage, Parsed
 from socialai_dsl.llm.episode import Episode, EpisodeResult, Turn
-from socialai_dsl.llm.view import TextView
+from socialai_dsl.llm.view import LastStep, TextView
 
-__all__ = ["Action", "ActionLanguage", "Episode", "EpisodeResult", "Parsed", "TextView", "Turn"]
+__all__ = ["Action", "ActionLanguage", "Episode", "EpisodeResult", "LastStep", "Parsed", "TextView", "Turn"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import partial
 from heapq import nlargest
@@ -13,7 +14,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 from socialai_dsl.diagnostics import bounded_suggestions, printable, suggested
 from socialai_dsl.llm.replies import conclusion, lines_of, mark, plain, readable
 from socialai_dsl.program_suite import Playable
-from socialai_dsl.vocabulary import NOUN, words
+from socialai_dsl.vocabulary import NOUN, normal, words
 
 Mode = Literal["text", "json", "tools"]
 """How a model gives its action: in a line of its reply, as a JSON object, or by calling tools."""
@@ -124,9 +125,10 @@ class ActionLanguage:
         }
         spoken = (program.sentences.text(*one) for one in program.sentences.each())
         self._sentences = list(dict.fromkeys(spoken))
-        self._by_words: dict[tuple[str, ...], str] = {}
-        for sentence in self._sentences:
-            self._by_words.setdefault(tuple(words(sentence)), sentence)
+        counts = Counter(tuple(words(sentence)) for sentence in self._sentences)
+        by_words = {tuple(words(sentence)): sentence for sentence in self._sentences}
+        self._by_words = {said: sentence for said, sentence in by_words.items() if counts[said] == 1}
+        self._as_heard = {normal(sentence): sentence for sentence in self._sentences}
         self._exact = set(self._sentences)
         self._longest = _ASIDE + max(map(len, self._sentences), default=0)
         moving = (said for said, action in self._movements.items() if action != _STANDING)
@@ -301,7 +303,9 @@ class ActionLanguage:
 
     def _sentence(self, text: str) -> str | None:
         """The sentence that a text is; None if it cannot be said."""
-        return text if text in self._exact else self._by_words.get(tuple(words(text)))
+        if text in self._exact:
+            return text
+        return self._as_heard.get(normal(text)) or self._by_words.get(tuple(words(text)))
 
     def _with_quotations(
         self, content: str, quoted: Sequence[tuple[re.Match[str], str | None]]

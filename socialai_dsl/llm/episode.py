@@ -18,7 +18,7 @@ from socialai_dsl.envs.factory import Scenario, load_playable
 from socialai_dsl.episodes.play import AGENT, Rooms
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
-from socialai_dsl.llm.view import Style, TextView
+from socialai_dsl.llm.view import LastStep, Style, TextView, over
 from socialai_dsl.program_suite import outcome_name
 
 OnInvalid = Literal["noop", "retry", "fail"]
@@ -240,7 +240,7 @@ class Episode(Copied):
         if self._on_invalid == "fail":
             self._note()
             self.end(STOPPED if stopped else INVALID)
-            return Turn(f"Your reply was not understood: {error}", 0.0, True, None, error)
+            return Turn(f"Your reply was not understood: {error}\n{over(False)}", 0.0, True, None, error)
         if self._on_invalid == "retry" and self._refused < _TRIES:
             self._note()
             text = f"Your reply was not understood: {error} Reply again.\n{self._text}"
@@ -250,17 +250,18 @@ class Episode(Copied):
 
     def _play(self, action: Action, error: str = "") -> Turn:
         encoded = self.env.encode_action(action)
+        before = self._seen["image"].copy()
         step = self._rooms.step({AGENT: encoded[None]})
         self.actions.append(encoded)
         done, reward = bool(step.ended[0]), float(step.reward[0])
         if self._asker is not None:
             self._questions = self._asker.step(encoded, self._seen["image"], done)
         self._note(reward, played=True)
-        if done:
-            self._result = replace(
-                self._result, ending=outcome_name(step.info), success=bool(step.success[0])
-            )
-        self._text = self._news(step.info) + self.view.observe(self._seen, step.info)
+        success = bool(step.success[0]) if done else None
+        if success is not None:
+            self._result = replace(self._result, ending=outcome_name(step.info), success=success)
+        last = LastStep(action.movement, before, success)
+        self._text = self._news(step.info) + self.view.observe(self._seen, step.info, last)
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
         return Turn(told + self._text, reward, done, action, error)
 

@@ -16,7 +16,7 @@ from socialai_dsl.envs.factory import compiled
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CONTEXT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
-from socialai_dsl.llm.view import Style
+from socialai_dsl.llm.view import Style, TextView
 
 _RESULT: Final = "result"
 _STOPS: Final = {"max_tokens": "length", "content_filter": "content_filter"}
@@ -73,7 +73,13 @@ def scenario(
         dataset=MemoryDataset(samples, name=scenario),
         solver=player(lambda: Episode(program, **options), history),
         scorer=outcome(),
-        metadata={"scenario": scenario, "program_sha256": program.sha256, **briefing.record()},
+        version=TextView.version,
+        metadata={
+            "scenario": scenario,
+            "program_sha256": program.sha256,
+            "text": TextView.version,
+            **briefing.record(),
+        },
     )
 
 

@@ -15,8 +15,8 @@ LOOKS: Final = 4
 """Channels that say what things look like; those behind them are gestures, and what is carried."""
 
 COMPASS: Final = ("east", "south", "west", "north")
-RELATIVE: Final = ("towards you", "to your left", "away from you", "to your right")
-"""Directions of others in words, absolute and as seen from the agent."""
+RELATIVE: Final = ("past you", "to your left", "away from you", "to your right")
+"""Directions of others in words, absolute and as seen from the agent, which they may also face: `directions_at`."""
 
 _SURFACES: Final = ("wall", "fence", "lava", "floor", "platform")
 _ACTS: Final = {
@@ -46,6 +46,14 @@ def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
     return {code: kind for code, kind in alike.items() if " or " not in kind}
 
 
+def directions_at(ahead: int, right: int, directions: tuple[str, ...]) -> tuple[str, ...]:
+    """The words for directions of somebody at a place, where one of those seen from the agent leads `towards you`."""
+    if directions != RELATIVE or (ahead and right):
+        return directions
+    towards = 0 if ahead else 1 if right > 0 else 3
+    return tuple("towards you" if n == towards else word for n, word in enumerate(directions))
+
+
 def is_surface(cell: Cell) -> bool:
     """Whether a cell shows what usually covers many cells, or nothing because it is out of sight."""
     found = types_by_code().get(cell[0])
@@ -65,7 +73,7 @@ def facts(
         cell: not an empty one.
         channels: names of its numbers.
         kinds: see `kinds_of`.
-        directions: `COMPASS` or `RELATIVE`, for those of NPCs.
+        directions: of NPCs, in words: `COMPASS`, or see `directions_at`.
         looks: words of the channels that are looks.
     """
     numbers = dict(zip(channels, cell, strict=True))
@@ -82,7 +90,7 @@ def _facts(
         return {"what": "cells out of sight"}
     if kind == NPC:
         what = kinds.get(status, f"person of look {status}")
-        look = {"what": what, "color": COLORS[colour], "looking": directions[orientation]}
+        look = {"what": what, "color": COLORS[colour], "facing": directions[orientation]}
         return look | _gestures(numbers, directions) | _carried(numbers)
     found = types_by_code().get(kind)
     if found is None:
@@ -99,7 +107,7 @@ def _facts(
 
 
 def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
-    """Facts in a few words: `a closed red door`, `a small striped ball`, `a blue guide, mood angry, looking east`.
+    """Facts in a few words: `a closed red door`, `a small striped ball`, `a blue guide, mood angry, facing east`.
 
     Args:
         told: see `facts`.
@@ -109,11 +117,11 @@ def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
     plain = [
         word
         for word in looks.values()
-        if "looking" not in told and word not in shared and word != told.get("state")
+        if "facing" not in told and word not in shared and word != told.get("state")
     ]
     named = " ".join([*plain, *(told[key] for key in ("state", "color", "what") if key in told)])
     doing = [f"{look} {word}" for look, word in looks.items() if word not in plain]
-    doing += [f"{key} {told[key]}" for key in ("looking", "moving", "pointing", "carrying") if key in told]
+    doing += [f"{key} {told[key]}" for key in ("facing", "moving", "pointing", "carrying") if key in told]
     doing += [told["last"]] if "last" in told else []
     if told["what"].startswith("cells"):
         return named

@@ -25,7 +25,7 @@ from pydantic import Field, model_validator
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.llm.episode import Episode
 from socialai_dsl.llm.gate import IDLE, Gate
-from socialai_dsl.llm.view import Style
+from socialai_dsl.llm.view import Style, TextView
 from socialai_dsl.program_suite import Playable
 
 _SEEDS = 1 << 31
@@ -140,8 +140,12 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         )
 
     def get_metadata(self) -> EnvironmentMetadata:
-        """Name and description."""
-        return EnvironmentMetadata(name=self._name, description=f"The scenario {self._name}, in text.")
+        """Name, description, and the version of the text."""
+        return EnvironmentMetadata(
+            name=self._name,
+            description=f"The scenario {self._name}, in text.",
+            version=str(TextView.version),
+        )
 
     def close(self) -> None:
         """Let the environment go."""

@@ -28,7 +28,7 @@ from socialai_dsl.llm.episode import CONTEXT, CUT_SHORT, Episode, EpisodeResult,
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.replies import readable
-from socialai_dsl.llm.view import Style
+from socialai_dsl.llm.view import Style, TextView
 from socialai_dsl.program_suite import Playable
 
 FORMAT: Final = "socialai-transcript/2"
@@ -131,7 +131,7 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / _SETTINGS
-    content = {"format": FORMAT, **settings}
+    content = {"format": FORMAT, "text": TextView.version, **settings}
     if path.exists():
         try:
             found = json.loads(path.read_text(encoding="utf-8"))

@@ -14,7 +14,7 @@ from socialai_dsl.llm.episode import TEST_SET, Episode
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
-_OVER: Final = "The episode is over. Reply without calling a tool."
+_CLOSING: Final = "Reply without calling a tool."
 
 
 class SocialEnv:
@@ -56,10 +56,10 @@ class SocialEnv:
     def _call(self, tool: str, arguments: Mapping[str, str]) -> str:
         """Play what a tool means; what the model is told of it."""
         if self._done:
-            return _OVER
+            return f"The episode is over. {_CLOSING}"
         turn = self._episode.step([ToolCall(tool, json.dumps(arguments))])
         self._done = turn.done
-        return f"{turn.text}\n{_OVER}" if turn.done else turn.text
+        return f"{turn.text}\n{_CLOSING}" if turn.done else turn.text
 
 
 def social_env(

@@ -6,26 +6,29 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from typing import Any, Final, Literal, get_args
+from typing import Any, ClassVar, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.library import types_by_code
+from socialai_dsl.llm import laws
 from socialai_dsl.llm.actions import ActionLanguage, Mode
 from socialai_dsl.llm.looks import (
     COMPASS,
     LOOKS,
     RELATIVE,
     Cell,
+    directions_at,
     facts,
     is_surface,
     kinds_of,
     phrase,
     steps,
 )
-from socialai_dsl.program import VIEW, Flag, Header, Program
+from socialai_dsl.program import VIEW, Flag, Program
 from socialai_dsl.program_suite import Playable, channels_of, words_of_looks
 from socialai_dsl.render.grid import draw_ansi, letters
 from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN
@@ -34,7 +37,23 @@ Style = Literal["prose", "grid", "json"]
 """Sentences with places in steps, as in the SocialAI School; a picture of letters with a legend; JSON."""
 
 _OWN: Final = (VIEW // 2, VIEW - 1)
+_HERE: Final = (0, 0)
 _UP: Final = 3
+_RESTLESS: Final = (NPC, UNSEEN, *(code for code, kind in types_by_code().items() if kind.rolls))
+"""Codes of what may look otherwise after a step without having changed, or moves by itself."""
+_READING: Final[Mapping[Style, str]] = {
+    "prose": "All other cells are empty.",
+    "grid": (
+        "The picture has two characters for each cell; you are the arrow in the middle of the lowest row and look up. "
+        "' .' is an empty cell and '  ' one out of your sight; below, the others are explained."
+    ),
+    "json": (
+        'Places are counted in steps, "ahead" of you and to your "right", negative to your left. An area is [least '
+        'ahead, most ahead, least right, most right]. All other cells are empty. "moved": false says that your step '
+        "failed."
+    ),
+}
+"""How to read what is seen."""
 _REMEMBERED: Final = 4096
 
 Place = tuple[int, int]
@@ -43,20 +62,40 @@ Area = tuple[int, int, int, int]
 """Least and most steps ahead, least and most to the right."""
 
 
+class LastStep(NamedTuple):
+    """The step that led to an observation.
+
+    Attributes:
+        movement: the word for the body action; None for no movement.
+        before: the picture before it, as in the observation.
+        success: whether the episode has ended in success; None while it goes on.
+    """
+
+    movement: str | None
+    before: NDArray[np.uint8]
+    success: bool | None = None
+
+
 class TextView:
     """Observations as text.
 
     A language model perceives what a trained agent perceives: the text depends on the observation and the lines heard
-    alone, and different observations have different texts.
+    alone, and different observations have different texts. Of the step before it the text says what follows from the
+    two pictures, that a step ahead failed, and at the end of an episode whether that is a success.
 
     Args:
         program: of a scenario or suite.
         style: `prose` (sentences with places in steps), `grid` (letters with a legend) or `json`.
         colour: whether the letters of a grid have escape codes for colours, for a terminal.
 
+    Attributes:
+        version: of the text; it grows with every change of what models read.
+
     Raises:
         ValueError: there is no such style.
     """
+
+    version: ClassVar[int] = 2
 
     def __init__(self, program: Playable, style: Style = "prose", colour: bool = False) -> None:
         if style not in get_args(Style):
@@ -66,7 +105,7 @@ class TextView:
         self._kinds = kinds_of(list(self._members.values()))
         self._channels = channels_of(self._members.values())
         self._looks = words_of_looks(self._members.values())
-        self._egocentric = {_is_egocentric(program) for program in self._members.values()}
+        self._egocentric = {laws.has(program, Flag.EGOCENTRIC) for program in self._members.values()}
         words = Counter(word for look in self._looks.values() for word in look)
         self._shared = frozenset(word for word, looks in words.items() if looks > 1)
         self._language = ActionLanguage(program)
@@ -97,52 +136,41 @@ class TextView:
             )
         )
 
-    def task(self, goal: str = "") -> str:
-        """How long an episode lasts, and what is told of the aim."""
-        turns = max(program.header(Header.HORIZON) for program in self._members.values())
-        return f"An episode lasts {turns} turns at most. {goal or UNTOLD}"
+    def explanation(self) -> str:
+        """How to read what is seen, who hears whom, and the order of a turn."""
+        programs = self._members.values()
+        parts = (f"{laws.sight(programs)} {_READING[self._style]}", laws.hearing(programs), laws.order(programs))
+        return "\n".join(part for part in parts if part)
 
-    def observe(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> str:
+    def task(self, goal: str = "") -> str:
+        """What ends an episode, and what is told of the aim."""
+        return f"{laws.ending(self._members.values())} {goal or UNTOLD}"
+
+    def observe(
+        self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], last: LastStep | None = None
+    ) -> str:
         """The observation of the present moment as text.
 
         Args:
             observation: of `ScenarioEnv`.
             info: of the same step.
+            last: the step before it; None at the start of an episode.
         """
         image = observation["image"]
         seen = self._described(image.tobytes(), self._directions(info))
         utterance = info["utterance"]
         heard = [] if utterance == "NA" else [printable(line) for line in utterance.split("\n")]
+        stayed = last is not None and last.movement == "forward" and _stayed(last.before, image)
+        success = None if last is None else last.success
         if self._style == "json":
-            return f'{seen[:-1]}, "heard": {json.dumps(heard, ensure_ascii=False)}}}'
-        return "\n".join(
+            more = {"heard": heard, **({"moved": False} if stayed else {})}
+            more |= {} if success is None else {"over": True, "success": success}
+            return f"{seen[:-1]}, {json.dumps(more, ensure_ascii=False)[1:]}"
+        lines = ["You did not move."] if stayed else []
+        lines += (
             [seen, "You hear:", *(f"- {line}" for line in heard)] if heard else [seen, "You hear nothing."]
         )
-
-    def explanation(self) -> str:
-        """How to read what is seen."""
-        blocked = any(program.header(Header.FLAGS) & Flag.OCCLUSION for program in self._members.values())
-        parts = [
-            f"You see the cells up to {VIEW - 1} steps ahead of you and up to {VIEW // 2} steps to your left and "
-            f"right{', as far as nothing blocks your sight' if blocked else ''}."
-        ]
-        if True in self._egocentric:
-            parts.append("Directions of others are given as seen from you.")
-        if False in self._egocentric:
-            parts.append("Directions of others are those of a compass; your own is not given.")
-        if self._style == "grid":
-            parts.append(
-                "The picture has two characters for each cell; you are the arrow in the middle of the lowest row and "
-                "look up. ' .' is an empty cell and '  ' one out of your sight; below, the others are explained."
-            )
-        elif self._style == "json":
-            parts.append(
-                'Places are counted in steps, "ahead" of you and to your "right", negative to your left. An area is '
-                "[least ahead, most ahead, least right, most right]. All other cells are empty."
-            )
-        else:
-            parts.append("All other cells are empty.")
-        return " ".join(parts)
+        return "\n".join(lines if success is None else [*lines, over(success)])
 
     def by_compass(self, info: Mapping[str, Any]) -> bool:
         """Whether directions of NPCs are those of a compass in what is played; if not, they are seen from the agent."""
@@ -152,7 +180,7 @@ class TextView:
         """The words for directions of NPCs; only the members of a mixed suite differ in them."""
         egocentric = self._egocentric
         if len(egocentric) > 1:
-            egocentric = {_is_egocentric(self._members[info["member"]])}
+            egocentric = {laws.has(self._members[info["member"]], Flag.EGOCENTRIC)}
         return RELATIVE if True in egocentric else COMPASS
 
     def _describe(self, data: bytes, directions: tuple[str, ...]) -> str:
@@ -161,28 +189,28 @@ class TextView:
         seen: dict[Place, Cell] = {}
         for across, along in np.ndindex(VIEW, VIEW):
             cell = tuple(image[across, along].tolist())
-            if (across, along) != _OWN and cell[0] != EMPTY:
+            if cell[0] != EMPTY:
                 seen[VIEW - 1 - along, across - VIEW // 2] = cell
-        own = tuple(image[_OWN].tolist())
         told = {
-            cell: facts(cell, self._channels, self._kinds, directions, self._looks)
-            for cell in (*seen.values(), own)
+            place: facts(cell, self._channels, self._kinds, directions_at(*place, directions), self._looks)
+            for place, cell in seen.items()
         }
-        carried = None if own[0] == EMPTY else told[own]
-        words = {cell: phrase(one, self._shared) for cell, one in told.items()}
-        own_hands = [] if carried is None else [f"You carry {words[own]}."]
+        words = {place: phrase(one, self._shared) for place, one in told.items()}
+        carried = told.get(_HERE)
+        own_hands = [] if carried is None else [f"You carry {words[_HERE]}."]
+        seen.pop(_HERE, None)
         if self._style == "grid":
             return "\n".join([_picture(image, seen, words, directions, self._colour), *own_hands])
         places = sorted((p for p, cell in seen.items() if not is_surface(cell)), key=_nearness)
-        surfaces = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
-        areas = {cell: _areas(place for place, found in seen.items() if found == cell) for cell in surfaces}
+        kinds = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
+        surfaces = [[place for place, cell in seen.items() if cell == kind] for kind in kinds]
         if self._style == "json":
-            things = [told[seen[place]] | {"ahead": place[0], "right": place[1]} for place in places]
-            covered = [told[cell] | {"areas": areas[cell]} for cell in surfaces]
+            things = [told[place] | {"ahead": place[0], "right": place[1]} for place in places]
+            covered = [told[cells[0]] | {"areas": _areas(cells)} for cells in surfaces]
             hands = {} if carried is None else {"carrying": carried}
             return json.dumps({"seen": things, "covered": covered} | hands, ensure_ascii=False)
-        lines = [f"- {_where(place)}: {words[seen[place]]}" for place in places]
-        lines += [f"- {words[cell]}: {'; '.join(map(_extent, areas[cell]))}" for cell in surfaces]
+        lines = [f"- {_where(place)}: {words[place]}" for place in places]
+        lines += [f"- {words[cells[0]]}: {'; '.join(map(_extent, _areas(cells)))}" for cells in surfaces]
         told_of_cells = ["You see:", *lines] if lines else ["You see nothing but empty cells."]
         return "\n".join([*told_of_cells, *own_hands])
 
@@ -194,14 +222,28 @@ def _members(program: Playable) -> dict[str | None, Program]:
     return dict(zip(program.members, program.programs, strict=True))
 
 
-def _is_egocentric(program: Program) -> bool:
-    return bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
+def over(success: bool) -> str:
+    """How the last message of an episode ends."""
+    return f"The episode is over, {'with' if success else 'without'} success."
+
+
+def _stayed(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> bool:
+    """Whether two pictures show that the step ahead between them failed.
+
+    What does not move by itself looks as before, and some of it would not if the agent stood a cell further.
+    """
+    known = np.logical_and(*(~np.isin(image[..., 0], _RESTLESS) for image in (before, after)))
+    known[_OWN] = False
+    if (before != after).any(axis=-1)[known].any():
+        return False
+    both = known[:, 1:] & known[:, :-1]
+    return bool((after[:, 1:] != before[:, :-1]).any(axis=-1)[both].any())
 
 
 def _picture(
     image: NDArray[np.uint8],
     seen: Mapping[Place, Cell],
-    words: Mapping[Cell, str],
+    words: Mapping[Place, str],
     directions: tuple[str, ...],
     colour: bool,
 ) -> str:
@@ -216,7 +258,7 @@ def _picture(
         if cell[0] != UNSEEN:
             look = letters(codes, VIEW - 1 - place[0], place[1] + VIEW // 2)
             where = f", {_where(place)}" if cell[0] == NPC else ""
-            legend[f"{look} {words[cell]}{where}"] = None
+            legend[f"{look} {words[place]}{where}"] = None
     return "\n".join(["You see:", draw_ansi(codes, (*_OWN, _UP), colour), *legend])
 
 

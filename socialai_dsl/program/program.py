@@ -124,6 +124,7 @@ class Program:
         source_map: one span (or None) for each instruction.
         labels: heading of the block that starts at a pc.
         looks: name and words of each look that the picture shows.
+        names_shown: whether a line begins with the name of who says it.
     """
 
     words: npt.NDArray[np.int32]
@@ -139,6 +140,7 @@ class Program:
     source_map: Sequence[Span | None] = field(repr=False)
     labels: Mapping[int, str] = field(repr=False)
     looks: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    names_shown: bool = True
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: nothing changes it."""

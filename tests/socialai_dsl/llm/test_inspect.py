@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.llm import Episode
+from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import scripted_reply
 
 pytest.importorskip("inspect_ai", reason="Inspect AI needs the extra inspect")
@@ -64,6 +64,7 @@ def test_the_task_of_the_entry_point_scores_what_the_script_reaches() -> None:
     assert values["invalid_rate"]["mean"] == 0
     scores = [sample.scores["outcome"] for sample in log.samples]
     assert {score.answer for score in scores} == {result.ending for result in results}
+    assert (log.eval.task_version, log.eval.metadata["text"]) == (TextView.version, TextView.version)
     assert log.eval.metadata["program_sha256"] == sd.compile(sd.load("talkitout")).sha256
 
 

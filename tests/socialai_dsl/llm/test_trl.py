@@ -80,7 +80,7 @@ def test_a_script_that_calls_tools_reaches_its_own_end(scenario: str) -> None:
             turn = beside.step(reply)
             assert told.startswith(turn.text)
             done = turn.done
-        assert told.endswith("The episode is over. Reply without calling a tool.")
+        assert told.endswith("The episode is over, with success.\nReply without calling a tool.")
         assert env.get_reward() == beside.result().total > 0
         reward = env.get_reward()
         assert env.move(direction="left") == "The episode is over. Reply without calling a tool."  # type: ignore[attr-defined]
