@@ -15,7 +15,7 @@ from socialai_dsl import load
 from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.cli.main import main
 from socialai_dsl.envs.asking import Question
-from socialai_dsl.llm import Episode
+from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import scripted_reply
 from socialai_dsl.runs.folder import scenario_folder_name
 from tests.quick import one_in
@@ -449,6 +449,19 @@ def test_other_settings_need_another_folder(tmp_path: Path, capsys: Capture) -> 
         assert evaluate(stub.url, tmp_path) == 0
         assert evaluate(stub.url, tmp_path, "--style", "grid", "--history", "2") == 2
     assert "played with another history, style; choose another folder" in capsys.readouterr().err
+
+
+def test_episodes_of_another_text_are_kept_and_not_continued(tmp_path: Path, capsys: Capture) -> None:
+    settings = tmp_path / "talkitout/transcripts/settings.json"
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+        assert figures(tmp_path)["eval"]["text"] == TextView.version
+        content = json.loads(settings.read_text())
+        assert content["text"] == TextView.version
+        settings.write_text(json.dumps({**content, "text": TextView.version - 1}))
+        assert evaluate(stub.url, tmp_path, episodes=2) == 2
+    assert "played with another text; choose another folder" in capsys.readouterr().err
+    assert main(["replay", str(tmp_path / "talkitout"), "--out", str(tmp_path / "page.html")]) == 0
 
 
 def test_the_key_is_sent_and_appears_nowhere(tmp_path: Path, capsys: Capture, caplog: Any) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main
-from socialai_dsl.llm import Episode
+from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import scripted_reply
 
 pytest.importorskip("openenv", reason="serving OpenEnv needs the extra openenv")
@@ -82,6 +82,10 @@ def test_a_client_plays_an_episode_to_its_end(url: str) -> None:
         with pytest.raises(Exception, match="seed: got -1, expected a number greater than or equal to 0"):
             client.reset(seed=-1)
         assert client.reset(test_episode=3).observation.text == text
+
+
+def test_the_metadata_have_the_version_of_the_text(url: str) -> None:
+    assert httpx.get(f"{url}/metadata").json()["version"] == str(TextView.version)
 
 
 def served(idle: float = 60.0, sessions: int = 100, **options: Any) -> AbstractContextManager[str]:
