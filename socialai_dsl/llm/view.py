@@ -139,7 +139,11 @@ class TextView:
     def explanation(self) -> str:
         """How to read what is seen, who hears whom, and the order of a turn."""
         programs = self._members.values()
-        parts = (f"{laws.sight(programs)} {_READING[self._style]}", laws.hearing(programs), laws.order(programs))
+        parts = (
+            f"{laws.sight(programs)} {_READING[self._style]}",
+            laws.hearing(programs),
+            laws.order(programs),
+        )
         return "\n".join(part for part in parts if part)
 
     def task(self, goal: str = "") -> str:

@@ -16,7 +16,7 @@ from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.frontend import load
-from socialai_dsl.llm.view import TextView
+from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, outcome_name
 from socialai_dsl.render.panel import DialogueLine
@@ -183,10 +183,11 @@ class Game(Observer):
         before, info, action = self.now, step.info, step.actions[AGENT][0]
         image = rooms.observations[AGENT]["image"][0]
         words = describe_step(self._program, action, len(self._moments), info["utterance"])
+        movement = (*self._program.actions, None)[action[0]]
         self._moments.append(
             GameMoment(
                 image,
-                self._seen(image, info),
+                self._seen(image, info, LastStep(movement, before.view)),
                 info.get("member"),
                 action,
                 (*before.lines, *words.dialogue),
@@ -262,8 +263,8 @@ class Game(Observer):
         """Let the environment go."""
         self._env.close()
 
-    def _seen(self, image: NDArray[np.uint8], info: Mapping[str, Any]) -> str:
-        return self._text_view.observe({"image": image}, info)
+    def _seen(self, image: NDArray[np.uint8], info: Mapping[str, Any], last: LastStep | None = None) -> str:
+        return self._text_view.observe({"image": image}, info, last)
 
     def _note(self, event: str, **more: Any) -> None:
         if self.journal is not None:
