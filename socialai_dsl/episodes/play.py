@@ -183,7 +183,13 @@ class Rooms:
 
 
 class Agenda(Protocol):
-    """Which episodes are played."""
+    """Which episodes are played.
+
+    Attributes:
+        trials: how many episodes in a row a player remembers: it forgets before those whose numbers are multiples.
+    """
+
+    trials: int
 
     def following(self, room: int) -> int | None:
         """The number of the next episode in a room; None if nothing is left for it."""
@@ -193,18 +199,27 @@ class Agenda(Protocol):
 
 
 class _Queue:
-    """Episodes 0 to N - 1, each once: a room plays the next one that is left."""
+    """Episodes 0 to N - 1, each once: a room plays the next ones that are left, as many in a row as there are trials."""
 
-    def __init__(self, episodes: int) -> None:
-        self._waiting = iter(range(episodes))
+    def __init__(self, episodes: int, trials: int = 1) -> None:
+        self.trials = trials
+        self._waiting = iter(range(0, episodes, trials))
+        self._next: dict[int, int] = {}
 
     def following(self, room: int) -> int | None:
         """See `Agenda.following`."""
-        return next(self._waiting, None)
+        number = self._next.get(room, 0)
+        if number % self.trials == 0:
+            session = next(self._waiting, None)
+            if session is None:
+                return None
+            number = session
+        self._next[room] = number + 1
+        return number
 
 
 class TestEpisodes(_Queue):
-    """Episodes 0 to N - 1 of the test set."""
+    """Episodes 0 to N - 1 of the test set, as many in a row as there are trials in a session."""
 
     __test__ = False  # pytest takes it for a test
 
@@ -231,6 +246,8 @@ class EpisodesInARow:
     To count the first episodes that end anywhere would count too many short ones.
     """
 
+    trials = 1
+
     def __init__(self, seed: int, each: int) -> None:
         self._seed, self._each = seed, each
         self._played: dict[int, int] = {}
@@ -255,6 +272,8 @@ class OneEpisode:
         reset: its arguments.
         number: of the episode, which policies and observers are told.
     """
+
+    trials = 1
 
     def __init__(self, reset: Mapping[str, Any], number: int = 0) -> None:
         self._reset, self._number, self._played = dict(reset), number, False
@@ -329,8 +348,10 @@ def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: 
             f"envs: got {rooms.count} of them for {int(begun.sum())} episodes, expected at most as many"
         )
     rooms.begin(agenda.reset(begun, numbers), numbers, begun)
-    for policy in players.values():
-        policy.reset(begun.copy(), numbers.copy())
+    forgetting = begun & (numbers % agenda.trials == 0)
+    if forgetting.any():
+        for policy in players.values():
+            policy.reset(forgetting.copy(), numbers.copy())
 
 
 async def _asked(rooms: Rooms, seat: Seat, policy: Policy) -> Int64:

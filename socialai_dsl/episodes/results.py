@@ -61,6 +61,11 @@ class EvalResult:
         """N, the number of episodes, each played once."""
         return len(self.success)
 
+    def by_trial(self, trials: int) -> list[tuple[int, int]]:
+        """Successes and episodes of each trial of sessions of so many; episode n is trial n modulo their number."""
+        order = np.arange(self.episodes) % trials
+        return [(int(self.success[order == t].sum()), int((order == t).sum())) for t in range(trials)]
+
     @property
     def success_rate(self) -> float:
         """Share of the episodes that ended in success."""

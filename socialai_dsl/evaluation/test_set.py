@@ -17,7 +17,7 @@ from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy, require_trainer
 from socialai_dsl.episodes.policies import Policy
-from socialai_dsl.episodes.results import Actions, EvalResult, Results
+from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
@@ -51,6 +51,7 @@ class Evaluation:
         more: figures that count for this agent alone.
         replies: of a language model, what it answered before each action of each episode.
         folder: where it is kept, if it is. kept: the name that the scenario has there.
+        trials: how many episodes in a row the player remembered.
         briefing: what the player was told of the task.
     """
 
@@ -89,6 +90,8 @@ class Evaluation:
             "endings": [ending.figures(shares[ending.name], result.episodes) for ending in self.endings],
             "rules": dict(result.rules),
         }
+        if self.trials > 1:
+            figures["trials"] = [_trial(*counts) for counts in result.by_trial(self.trials)]
         figures |= {**_by_member(self.program, shares), **self.more}
         if self.player.is_script:
             # A room that the script does not solve is worth looking at: it can be played again by its number.
@@ -169,7 +172,7 @@ def _thinking(policy: Any, number: int) -> Think:
 
 
 def play_test_set(
-    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int
+    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int, trials: int = 1
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
@@ -179,6 +182,7 @@ def play_test_set(
         loaded: the same.
         program: the same, compiled.
         episodes: how many.
+        trials: how many in a row the player remembers.
 
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
@@ -198,19 +202,21 @@ def play_test_set(
         require_trainer()
     envs = make_vec(
         compiled(with_script(scenario, loaded).loaded) if player.is_script else program,
-        num_envs=min(_TOGETHER, episodes),
+        num_envs=min(_TOGETHER, episodes // trials),
         copy=False,
         autoreset_mode="Disabled",
     )
     try:
         policy, told = make_policy(player, envs)
         kept = Actions()
-        result = evaluate_policy(policy, envs, episodes, [kept])
+        result = evaluate_policy(policy, envs, episodes, [kept], trials)
     except ValueError as error:
         raise UsageError(f"{scenario}: {error}") from error
     finally:
         envs.close()
-    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
+    return Evaluation(
+        scenario, loaded, program, player, result, endings, kept.played, told, trials=trials
+    )
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
@@ -248,7 +254,7 @@ def _of_model(
 
 
 def evaluate_policy(
-    policy: Policy, envs: Any, episodes: int = 500, observers: Sequence[Observer] = ()
+    policy: Policy, envs: Any, episodes: int = 500, observers: Sequence[Observer] = (), trials: int = 1
 ) -> EvalResult:
     """Play test episodes 0 to `episodes - 1`, each exactly once.
 
@@ -260,6 +266,7 @@ def evaluate_policy(
         envs: a vector environment with `autoreset_mode="Disabled"`, which plays and counts the test episodes alone.
         episodes: N, at least the number of environments; the common test set has 500.
         observers: watch as well.
+        trials: how many episodes in a row the policy remembers; it is reset before each session of so many.
 
     Raises:
         ValueError: `episodes` is less than 1 or than the number of environments, or these reset themselves; or the
@@ -267,9 +274,11 @@ def evaluate_policy(
     """
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
+    if not 1 <= trials <= episodes or episodes % trials:
+        raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]
-    play(Rooms(envs, [results, *observers]), {AGENT: policy}, TestEpisodes(episodes))
+    play(Rooms(envs, [results, *observers]), {AGENT: policy}, TestEpisodes(episodes, trials))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
 
@@ -332,6 +341,12 @@ def _of_person(
     actions = {number: p.actions for number, p in enumerate(played)}
     endings = endings_of(loaded, program)
     return Evaluation(scenario, loaded, program, player, result, endings, actions, briefing=briefing)
+
+
+def _trial(successes: int, episodes: int) -> dict[str, Any]:
+    """What came of the episodes of one trial."""
+    interval = list(wilson_interval(successes, episodes))
+    return {"episodes": episodes, "success_rate": successes / episodes, "success_interval": interval}
 
 
 def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]:
