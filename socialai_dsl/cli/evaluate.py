@@ -11,6 +11,7 @@ from socialai_dsl.cli.arguments import (
     episodes,
     identifier,
     natural,
+    positive,
     refuse,
     seed,
     tell_options,
@@ -78,6 +79,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"with --out: record up to N successes and N failures (default: {RECORDED})",
     )
     parser.add_argument(
+        "--trials",
+        type=positive,
+        default=1,
+        metavar="K",
+        help="number of episodes in a row that the agent remembers, with results by trial (default: 1)",
+    )
+    parser.add_argument(
         "--participant",
         type=identifier,
         metavar="ID",
@@ -106,7 +114,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     player = made_player(agent, scenarios, _options(arguments), out, arguments.participant)
     recorded = RECORDED if arguments.record is None else arguments.record
     results = []
-    for evaluation in evaluate_each(player, scenarios, arguments.episodes, recorded, out):
+    for evaluation in evaluate_each(player, scenarios, arguments.episodes, recorded, out, arguments.trials):
         results.append(result_of(evaluation))
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)

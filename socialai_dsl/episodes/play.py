@@ -199,7 +199,7 @@ class Agenda(Protocol):
 
 
 class _Queue:
-    """Episodes 0 to N - 1, each once: a room plays the next ones that are left, as many in a row as there are trials."""
+    """Episodes 0 to N - 1, each once: a room plays the next that are left, a session of trials in a row."""
 
     def __init__(self, episodes: int, trials: int = 1) -> None:
         self.trials = trials

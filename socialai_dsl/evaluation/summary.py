@@ -23,6 +23,10 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
         ("mean return", f"{figures['mean_return']:.3f}"),
     ]
     rows[1:1] = [
+        (f"  trial {number}", f"{trial['success_rate']:.1%} of {trial['episodes']}")
+        for number, trial in enumerate(figures.get("trials", ()), 1)
+    ]
+    rows[1:1] = [
         (f"  {member}", f"{played['success_rate']:.1%} of the {played['share']:.1%} that played it")
         for member, played in figures.get("members", {}).items()
         if played["share"] > 0

@@ -67,6 +67,7 @@ class Evaluation:
     replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
     folder: Path | None = None
     kept: str | None = None
+    trials: int = 1
     briefing: Briefing = NO_BRIEFING
 
     @property
@@ -136,7 +137,9 @@ class Evaluation:
         """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
         env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded))
         try:
-            policy = make_policy(self.player, env)[0] if self.player.is_trained else None
+            # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
+            thinks = self.player.is_trained and self.trials == 1
+            policy = make_policy(self.player, env)[0] if thinks else None
             return [self._trace(env, policy, number) for number in numbers]
         finally:
             env.close()
@@ -214,9 +217,7 @@ def play_test_set(
         raise UsageError(f"{scenario}: {error}") from error
     finally:
         envs.close()
-    return Evaluation(
-        scenario, loaded, program, player, result, endings, kept.played, told, trials=trials
-    )
+    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told, trials=trials)
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:

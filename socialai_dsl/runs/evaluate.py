@@ -23,7 +23,7 @@ from socialai_dsl.episodes.players import (
     require_trainer,
     session_folder,
 )
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
 from socialai_dsl.frontend import load
 from socialai_dsl.replay.endings import short_name
@@ -57,6 +57,7 @@ def evaluate(
     *,
     out: str | Path | None = None,
     record: int = RECORDED,
+    trials: int = 1,
     **options: Any,
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
@@ -70,6 +71,8 @@ def evaluate(
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
             episodes and a list of all; reports take it. A language model and a person have one in any case.
         record: up to how many successes, and how many failures, are filmed there.
+        trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
+            that they show what can be learnt within a session. A person remembers all of a session in any case.
         options: of a trained agent `greedy`, `seed`, `device` and `net`, of `random` the `seed`; of a language model
             those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`, see `Player`,
             and of a person `view`.
@@ -84,21 +87,30 @@ def evaluate(
     named = [] if scenario is None else [str(scenario)]
     player = made_player(agent, named, options, None if out is None else Path(out))
     place = None if out is None else Path(out)
-    with contextlib.closing(evaluate_each(player, named, episodes, record, place)) as evaluations:
+    with contextlib.closing(evaluate_each(player, named, episodes, record, place, trials)) as evaluations:
         return next(evaluations)
 
 
 def evaluate_each(
-    player: Player, scenarios: Sequence[str], episodes: int, record: int = RECORDED, out: Path | None = None
+    player: Player,
+    scenarios: Sequence[str],
+    episodes: int,
+    record: int = RECORDED,
+    out: Path | None = None,
+    trials: int = 1,
 ) -> Generator[Evaluation, None, None]:
     """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
     if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
-        raise ValueError(f"episodes: got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
+        raise OptionError("episodes", f"got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
+    if not isinstance(trials, int) or trials < 1 or episodes % trials:
+        raise OptionError("trials", f"got {trials!r}, expected a divisor of the {episodes} episodes")
+    if player.is_person and trials > 1:
+        raise OptionError("trials", f"got {trials}, but a person remembers all episodes of a session")
     folder = player.kept_in if player.is_model or player.is_person else out
     results = []
     with contextlib.nullcontext() if folder is None else _writing(folder):
         for scenario in scenarios or [own_scenario(player.agent)]:
-            evaluation = _evaluated(player, scenario, episodes, record, folder)
+            evaluation = _evaluated(player, scenario, episodes, trials, record, folder)
             results.append(result_of(evaluation))
             if folder is not None:
                 # After each scenario, so that nothing is lost should the agent not fit the next one.
@@ -114,11 +126,13 @@ def _writing(folder: Path) -> Iterator[None]:
         yield
 
 
-def _evaluated(player: Player, scenario: str, episodes: int, record: int, out: Path | None) -> Evaluation:
+def _evaluated(
+    player: Player, scenario: str, episodes: int, trials: int, record: int, out: Path | None
+) -> Evaluation:
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
     if out is None:
-        return play_test_set(playing, scenario, loaded, compiled(loaded), episodes)
+        return play_test_set(playing, scenario, loaded, compiled(loaded), episodes, trials)
     place = out / scenario_folder_name(scenario)
     with new_folders(place) as made:
         kept = keep_scenario(place, scenario, loaded).scenario
@@ -126,7 +140,7 @@ def _evaluated(player: Player, scenario: str, episodes: int, record: int, out: P
         settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
         write_json(place / CONFIG, settings)
         made.update(place.iterdir())
-        played = play_test_set(playing, scenario, loaded, compiled(loaded), episodes)
+        played = play_test_set(playing, scenario, loaded, compiled(loaded), episodes, trials)
     evaluation = replace(played, folder=place, kept=kept)
     write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
     write_json(place / RESULT, result_of(evaluation))
@@ -192,6 +206,7 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "kind": player.kind,
         "greedy": player.greedy,
         "seed": player.seed,
+        "trials": evaluation.trials,
         **evaluation.granted,
         **more,
         "warnings": list(evaluation.warnings),

@@ -17,7 +17,7 @@ import socialai_dsl as sd
 from socialai_dsl.cli.trace_text import present
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.picture import frame
-from socialai_dsl.episodes.film import record
+from socialai_dsl.episodes.film import film as film_of
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.play.game import Game
@@ -164,7 +164,7 @@ def test_films_show_what_pictures_show(name: str, tmp_path: Path) -> None:
         images.append(observation["image"].tobytes())
         if terminated or truncated:
             break
-    episode = record(env, env.program, actions, name, {"seed": 0})
+    episode = film_of(env, actions, {"seed": 0}, name)
     episode.save_film(tmp_path / "film.gif")
     shown: dict[bytes, bytes] = {}
     with Image.open(tmp_path / "film.gif") as film:
