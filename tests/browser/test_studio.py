@@ -323,7 +323,10 @@ def test_as_the_agent_sees_it_there_is_no_room(studio: Page) -> None:
     assert (
         seen.text_content() == f"{TextView(beside.env.program, 'grid').observe(*beside.env.reset(seed=SEED))}"
     )
-    assert "An episode lasts 100 turns at most" in studio.locator(".seat p").inner_text()
+    assert (
+        "An episode ends with success, with failure, or after 100 turns"
+        in studio.locator(".seat p").inner_text()
+    )
     for hidden in (".stage", ".cast", ".why", ".counts", ".writing", ".sight"):
         assert not studio.locator(hidden).first.is_visible()
     studio.keyboard.press("x")

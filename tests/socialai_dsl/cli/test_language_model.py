@@ -170,7 +170,9 @@ def test_instructions_are_told_in_a_language_and_recorded(tmp_path: Path, capsys
         told[name] = {key: result[key] for key in ("tell", "told", "language") if key in result}
         assert told[name] == {key: settings[key] for key in ("tell", "told", "language") if key in settings}
         system = stub.requests[0]["messages"][0]["content"]
-        assert system.endswith(f"An episode lasts 3 turns at most. {told[name].get('told', UNTOLD)}")
+        assert system.endswith(
+            f"An episode ends with success, with failure, or after 3 turns. {told[name].get('told', UNTOLD)}"
+        )
         assert "hypothesis" not in system
     assert told == {
         "own": {"tell": "instructions", "told": "Go.", "language": "en"},

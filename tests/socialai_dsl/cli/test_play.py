@@ -135,7 +135,7 @@ def test_talkitout_is_played_to_success_in_a_terminal(
     screen = terminal("play", "talkitout", "--seed", str(SEED), "--out", str(tmp_path))
     first = screen.shows("step 0 ", "q quit")
     assert "Leave by the right one" not in first, "that is for authors"
-    assert "An episode lasts 100 turns at most" in first
+    assert "An episode ends with success, with failure" in first
 
     # A step too many, and back; the states of frames shown, and hidden.
     screen.press(ARROWS["left"])
@@ -371,7 +371,7 @@ def test_players_of_a_suite_are_told_the_instructions_of_its_member(tmp_path: Pa
         for _ in range(6):
             await pilot.press("n")
             told.add(shown(app, "#lines"))
-        turns = "An episode lasts 9 turns at most."
+        turns = "An episode ends with success, with failure, or after 9 turns."
         assert told == {f"{turns} Walk on.", f"{turns} Wait here."}
 
     played(str(tmp_path / "both.yaml"), play)

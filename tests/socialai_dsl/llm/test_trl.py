@@ -61,7 +61,7 @@ def test_what_is_told_of_the_task(signal: Path) -> None:
         UNTOLD: {"tell": "nothing"},
     }.items():
         text = social_env(signal, **options)().reset(seed=0)  # type: ignore[arg-type]
-        assert f"An episode lasts 3 turns at most. {told}\n\nYou see" in text
+        assert f"An episode ends with success, with failure, or after 3 turns. {told}\n\nYou see" in text
 
 
 @pytest.mark.parametrize("scenario", ["talkitout", "dance", "school/boxes+pointing", "novel/sally_anne"])

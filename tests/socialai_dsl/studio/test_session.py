@@ -56,7 +56,7 @@ def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path
             session.draw(str(path), path.read_text() + "instructions: {en: Ask., de: Frag.}\n", 3)
         seat = session.begin(3)["seat"]
         assert seat["seen"] == model.reset(3)
-        assert seat["told"] == f"An episode lasts 100 turns at most. {told}"
+        assert seat["told"] == f"An episode ends with success, with failure, or after 100 turns. {told}"
         assert seat["compass"]
         for movement in ("left", "forward", "left"):
             assert session.act(movement)["seat"]["seen"] == model.step(f"Act: {movement}").text
