@@ -23,7 +23,7 @@ from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.episodes.traces import Tracing, thought_of
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
-from socialai_dsl.llm.view import TextView
+from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.endings import endings_of
@@ -265,22 +265,24 @@ class Session:
         if not stage.running.all():
             raise RefusalError(_ENDED)
         before, tracing.thought = tracing.tracer.counts(), thought
+        image = stage.observations[AGENT]["image"][0].copy()
         try:
             stage.step({AGENT: action})
         except (ValueError, RoomError) as error:
             who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
         more = tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)
-        return {"more": more, "seat": self._seat()}
+        movement = (*stage.env.program.actions, None)[action[0, 0]]
+        return {"more": more, "seat": self._seat(LastStep(movement, image))}
 
-    def _seat(self) -> Reply:
+    def _seat(self, last: LastStep | None = None) -> Reply:
         """What whoever plays is told, sees and hears, as a language model reads it."""
         stage, _ = self._playing()
         assert self._text_view is not None, "internal: what is played has a view"
         observation = {name: value[0] for name, value in stage.observations[AGENT].items()}
         return {
             "told": self._text_view.task(self._briefing.text(stage.info.get("member"))),
-            "seen": self._text_view.observe(observation, stage.info),
+            "seen": self._text_view.observe(observation, stage.info, last),
             "compass": self._text_view.by_compass(stage.info),
         }
 

@@ -2,6 +2,7 @@
 
 import json
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -14,6 +15,7 @@ from socialai_dsl.llm import Action, ActionLanguage
 from socialai_dsl.llm.actions import ToolCall
 from socialai_dsl.llm.questions import read_answer
 from socialai_dsl.loader.resolved import shipped_names
+from tests.tiny import Folder
 
 LANGUAGE = ActionLanguage(sd.compile(sd.load("talkitout")))
 EXIT = "Where is the exit"
@@ -269,3 +271,21 @@ def test_any_object_and_any_call_likewise(found: Any, name: str) -> None:
     ):
         assert (parsed.action is None) == bool(parsed.error)
         assert parsed.error.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        ('say "Well, yes"', "Well, yes"),
+        ('say "well yes!"', "Well yes"),
+        ('say "WELL, yes."', "Well, yes"),
+        ("say well yes", None),
+        ('say "Well; yes"', None),
+    ],
+)
+def test_sentences_with_the_same_words_are_told_apart_or_refused(
+    said: str, sentence: str | None, tmp_path: Path
+) -> None:
+    play = Folder(tmp_path)('grammar: {templates: ["Well, <noun>", Well <noun>], nouns: [yes, no]}')
+    action = ActionLanguage(play.env.unwrapped.program).parse(f"Act: {said}").action  # type: ignore[attr-defined]
+    assert action == (None if sentence is None else Action(None, sentence))
