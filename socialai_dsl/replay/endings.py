@@ -55,10 +55,11 @@ class Ending:
 def endings_of(loaded: Loaded, program: Playable) -> list[Ending]:
     """The ways that an episode can end, in the order of `program.outcomes`."""
     sources = _sources(loaded)
-    return [_ending(outcome, sources) for outcome in program.outcome_table]
+    folder = loaded.resolved.path.parent
+    return [_ending(outcome, sources, folder) for outcome in program.outcome_table]
 
 
-def _ending(outcome: Any, sources: Mapping[str, Source]) -> Ending:
+def _ending(outcome: Any, sources: Mapping[str, Source], folder: Path) -> Ending:
     member, colon, name = outcome.name.rpartition(": ")
     prefix = member + colon
     if outcome.span is None:
@@ -66,9 +67,11 @@ def _ending(outcome: Any, sources: Mapping[str, Source]) -> Ending:
     line = sources[outcome.span.file].line(outcome.span.line).strip().removeprefix("- ").lstrip()
     if line.startswith("{") and line.endswith("}"):
         line = line[1:-1].strip()
-    return Ending(
-        outcome.name, outcome.success, prefix + line, short_file(outcome.span.file), outcome.span.line
-    )
+    file = short_file(outcome.span.file)
+    path = Path(outcome.span.file).resolve()
+    if path.is_relative_to(folder) and not path.is_relative_to(shipped_folder().resolve()):
+        file = path.relative_to(folder).as_posix()  # wherever the scenario's files, or their copies, are
+    return Ending(outcome.name, outcome.success, prefix + line, file, outcome.span.line)
 
 
 def short_file(file: str) -> str:
