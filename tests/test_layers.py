@@ -120,7 +120,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"pydantic", "ray", "submitit", "yaml", CONFIG, FILES, SHIPPED},
     ),
     "reporting": (
-        {"errors", "experiments", "baselines", "runs.folder"},
+        {"atomic", "errors", "experiments", "baselines", "runs.folder"},
         {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),

@@ -71,9 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print the reports as a JSON array")
     parser.add_argument(
-        "--alone", action="store_true", help=argparse.SUPPRESS
-    )  # the object that `coverage` printed
-    parser.add_argument(
         "--strict", action="store_true", help="for claims: also fail for warnings and for what is undecided"
     )
 
@@ -105,7 +102,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
             break
     progress.clear()
     if arguments.json:
-        print(json_text(documents[0] if arguments.alone else documents))
+        print(json_text(documents))
     return max(ends)
 
 

@@ -2,9 +2,7 @@
 
 import argparse
 import contextlib
-import errno
 import secrets
-import socket
 import webbrowser
 from pathlib import Path
 from typing import Final
@@ -13,11 +11,9 @@ from socialai_dsl.cli.arguments import at_once, natural
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import SUFFIXES
-from socialai_dsl.studio import MOST_WINDOWS
+from socialai_dsl.studio import FIRST_PORT, MOST_WINDOWS
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
-_PORT: Final = 8765
-_TRIED: Final = 20
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="address to listen on (default: this machine only)",
     )
     parser.add_argument(
-        "--port", type=natural, metavar="N", help=f"port (default: {_PORT}, or the next free one)"
+        "--port", type=natural, metavar="N", help=f"port (default: {FIRST_PORT}, or the next free one)"
     )
     parser.add_argument(
         "--windows",
@@ -59,12 +55,12 @@ def execute(arguments: argparse.Namespace) -> Exit:
         import websockets  # noqa: F401
     except ImportError as error:
         raise UsageError(f"the studio needs {error.name}: pip install 'socialai-dsl[studio]'") from None
-    from socialai_dsl.studio.address import Address, remember, remembered
+    from socialai_dsl.studio.address import Address, listen, remember, remembered
     from socialai_dsl.studio.server import LARGEST_FRAME, Studio
 
     root, opened = _opened(arguments.path)
     former = remembered(root, arguments.host)
-    listening = _listen(arguments.host, arguments.port, former.port if former else None)
+    listening = listen(arguments.host, arguments.port, former.port if former else None)
     port, token = listening.getsockname()[1], former.token if former else secrets.token_urlsafe(24)
     remember(root, arguments.host, Address(token=token, port=port))
     shown = "127.0.0.1" if arguments.host in ("0.0.0.0", "::") else arguments.host
@@ -97,28 +93,6 @@ def _opened(path: Path) -> tuple[Path, str]:
         raise UsageError(f"{path}: {error.strerror}") from None
     what = f"{path} is no scenario's file" if path.exists() else f"there is no {path}"
     raise UsageError(f"{what}; expected a folder, or a file that ends in .yaml")
-
-
-def _listen(host: str, port: int | None, former: int | None) -> socket.socket:
-    """A socket at the port, or where none is asked for at the former one, or at the next free one.
-
-    Raises:
-        UsageError: the port is in use, or the address is not this machine's.
-    """
-    if port is not None and not 0 <= port < 1 << 16:
-        raise UsageError(f"--port: got {port}, expected 0 to 65535")
-    usual = range(_PORT, _PORT + _TRIED)
-    tried = [port] if port is not None else [*([former] if former else []), *usual]
-    for one in tried:
-        try:
-            family = socket.AF_INET6 if ":" in host else socket.AF_INET
-            return socket.create_server((host, one), family=family)
-        except OSError as error:
-            if error.errno != errno.EADDRINUSE and (port is not None or one != former):
-                raise UsageError(f"--host {host}: {error.strerror or error}") from None
-    if port is not None:
-        raise UsageError(f"--port: {port} is in use; leave it out to take a free one")
-    raise UsageError(f"--port: {usual[0]} to {usual[-1]} are in use; name another")
 
 
 def _open(address: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.atomic import read_json, write_json
+from socialai_dsl.atomic import write_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import refuse_unknown
@@ -36,11 +36,12 @@ from socialai_dsl.runs.folder import (
     new_folders,
     only_writer,
     scenario_folder_name,
+    scenario_of,
 )
 from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
-from trainer.config import RunConfig, scenario_in
+from trainer.config import RunConfig
 
 _PLAYER: Final = ("greedy", "seed", "device", "net")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))
@@ -225,7 +226,4 @@ def own_scenario(agent: str) -> str:
     run = folder_of(agent)
     if not (run / CONFIG).is_file():
         raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
-    scenario = read_json(run / CONFIG).get("scenario")
-    if not isinstance(scenario, str):
-        raise UsageError(f"{run / CONFIG}: scenario: expected a text, got {scenario!r}")
-    return scenario_in(run, scenario)
+    return scenario_of(run)

@@ -20,7 +20,7 @@ from socialai_dsl.errors import OptionError, UnreadableError, UsageError, descri
 from socialai_dsl.runs.lock import HeldError, Holder, hold, holder
 from socialai_dsl.runs.status import Status
 from trainer.config import SCENARIO_FOLDER as SCENARIO
-from trainer.config import RunConfig
+from trainer.config import RunConfig, scenario_file, scenario_in
 from trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
 
 # What training writes, and the copy of the scenario, are named where the trainer finds them.
@@ -191,17 +191,34 @@ def read_config(folder: Path) -> RunConfig:
     """The configuration of a run's folder, as of a run in this folder.
 
     Raises:
-        UsageError: it is not a run's folder, or its configuration is damaged.
+        UsageError: it is not a run's folder, its configuration is damaged, or its copy of the scenario is missing.
         OSError: it cannot be read.
     """
     if not (folder / CONFIG).is_file():
         raise UsageError(f"{folder} is not a run's folder, it has no {CONFIG}")
+    scenario_of(folder)
     try:
         # As JSON, because strict validation takes no lists for tuples from Python.
         return RunConfig.model_validate_json(json.dumps(read_json(folder / CONFIG))).within(folder)
     except ValidationError as error:
         place, said = first_mistake(error.errors())
         raise UsageError(f"{folder / CONFIG}: {place}: {said}") from None
+
+
+def scenario_of(folder: Path) -> str:
+    """The scenario that a run's folder is about, as it is loaded from here; other options may be of another version.
+
+    Raises:
+        UsageError: the folder does not say, or lacks its copy of the scenario.
+        OSError: it cannot be read.
+    """
+    scenario = read_json(folder / CONFIG).get("scenario")
+    if not isinstance(scenario, str):
+        raise UnreadableError(f"{folder / CONFIG}: scenario: expected a text, got {scenario!r}")
+    file = scenario_file(scenario)
+    if file.parts[:1] == (SCENARIO,) and not (folder / file).is_file() and not file.is_file():
+        raise UsageError(f"{folder} lacks its copy of the scenario, {file}; copy the folder as a whole")
+    return scenario_in(folder, scenario)
 
 
 def scenario_folder_name(spec: str) -> str:

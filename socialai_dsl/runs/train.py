@@ -28,6 +28,7 @@ from socialai_dsl.runs.folder import (
     CHECKPOINTS,
     CONFIG,
     LOCK_FILES,
+    METRICS,
     RESULT,
     Run,
     new_run_folder,
@@ -152,6 +153,8 @@ def _resumable(run: Run) -> RunConfig:
         raise OptionError("resume", str(error)) from None
     if not config.trains:
         raise OptionError("resume", f"the agent {config.agent!r} of {run.folder} is not trained")
+    if run.checkpoint_frames and run.last_metrics is None:
+        raise OptionError("resume", f"{run.folder} lacks its {METRICS}; copy the folder as a whole")
     return config
 
 

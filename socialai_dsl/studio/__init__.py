@@ -4,3 +4,6 @@ from typing import Final
 
 MOST_WINDOWS: Final = 32
 """How many windows may be open at once, unless the command says otherwise."""
+
+FIRST_PORT: Final = 8765
+"""The first port that is tried where none is asked for."""

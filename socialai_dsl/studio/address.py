@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import socket
 import stat
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from socialai_dsl.atomic import write_text
+from socialai_dsl.errors import OptionError
+from socialai_dsl.studio import FIRST_PORT
+
+_TRIED: Final = 20
 
 
 class Address(BaseModel):
@@ -55,3 +61,25 @@ def _file(root: Path, host: str) -> Path:
     home = Path(state) if os.path.isabs(state) else Path(os.path.expanduser("~")) / ".local" / "state"
     name = hashlib.sha256(f"{host} {root}".encode(errors="surrogateescape")).hexdigest()[:32]
     return home / "socialai" / "studio" / f"{name}.json"
+
+
+def listen(host: str, port: int | None, former: int | None) -> socket.socket:
+    """A socket at the port, or where none is asked for at the former one, or at the next free one.
+
+    Raises:
+        OptionError: the port is in use, or the address is not this machine's.
+    """
+    if port is not None and not 0 <= port < 1 << 16:
+        raise OptionError("port", f"got {port}, expected 0 to 65535")
+    usual = range(FIRST_PORT, FIRST_PORT + _TRIED)
+    tried = [port] if port is not None else [*([former] if former else []), *usual]
+    for one in tried:
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            return socket.create_server((host, one), family=family)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE and (port is not None or one != former):
+                raise OptionError("host", f"{host}: {error.strerror or error}") from None
+    if port is not None:
+        raise OptionError("port", f"{port} is in use; leave it out to take a free one")
+    raise OptionError("port", f"{usual[0]} to {usual[-1]} are in use; name another")

@@ -1,4 +1,4 @@
-"""`socialai coverage`: what came about, by file and line, and what never did."""
+"""`socialai check --part coverage`: what came about, by file and line, and what never did."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from socialai_dsl.cli.main import main
 from tests.tiny import Folder
 
 Capture = pytest.CaptureFixture[str]
+
+COVERAGE = ["--part", "coverage", "--seconds", "0"]
 
 DEAF = """
 frames:
@@ -33,7 +35,7 @@ def deaf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_what_never_happened_comes_last(deaf: str, capsys: Capture) -> None:
-    assert main(["coverage", deaf, "--agent", "random", "--episodes", "20"]) == 0
+    assert main(["check", deaf, "--agent", "random", "--episodes", "20", *COVERAGE]) == 0
     lines = capsys.readouterr().out.splitlines()
     never = lines.index("never:")
     assert any(line.startswith("deaf.yaml:8") and line.split()[-1] == "20" for line in lines[:never])
@@ -43,12 +45,15 @@ def test_what_never_happened_comes_last(deaf: str, capsys: Capture) -> None:
 
 @pytest.mark.parametrize(("least", "code"), [("80", 0), ("81", 1), ("0", 0)])
 def test_it_can_fail(deaf: str, least: str, code: int, capsys: Capture) -> None:
-    assert main(["coverage", deaf, "--agent", "random", "--episodes", "20", "--fail-under", least]) == code
+    assert (
+        main(["check", deaf, "--agent", "random", "--episodes", "20", "--fail-under", least, *COVERAGE])
+        == code
+    )
 
 
 def test_json_counts_for_each_agent(capsys: Capture) -> None:
-    assert main(["coverage", "diverse_exit", "help", "--episodes", "24", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    assert main(["check", "diverse_exit", "help", "--episodes", "24", "--json", *COVERAGE]) == 0
+    (report,) = json.loads(capsys.readouterr().out)
     assert report["scenarios"] == ["diverse_exit", "help"]
     assert report["episodes"] == {"random": 48, "oracle": 48}
     files = {Path(part["file"]).name for part in report["parts"]}
@@ -67,14 +72,17 @@ def test_json_counts_for_each_agent(capsys: Capture) -> None:
 def test_chance_is_reproducible(deaf: str, capsys: Capture) -> None:
     outputs = []
     for _ in range(2):
-        assert main(["coverage", "cointhief", "--agent", "random", "--episodes", "30", "--seed", "5"]) == 0
+        assert (
+            main(["check", "cointhief", "--agent", "random", "--episodes", "30", "--seed", "5", *COVERAGE])
+            == 0
+        )
         outputs.append(capsys.readouterr().out)
     assert outputs[0] == outputs[1]
 
 
 def test_members_of_a_suite_count(capsys: Capture) -> None:
-    assert main(["coverage", "social_env", "--agent", "oracle", "--episodes", "40", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    assert main(["check", "social_env", "--agent", "oracle", "--episodes", "40", "--json", *COVERAGE]) == 0
+    (report,) = json.loads(capsys.readouterr().out)
     assert {Path(part["file"]).stem for part in report["parts"]} >= {"talkitout", "dance", "help", "showme"}
 
 
@@ -88,7 +96,7 @@ def test_members_of_a_suite_count(capsys: Capture) -> None:
     ],
 )
 def test_wrong_usage_is_said_in_one_line(deaf: str, options: list[str], said: str, capsys: Capture) -> None:
-    assert main(["coverage", deaf, *options]) == 2
+    assert main(["check", deaf, *options, *COVERAGE]) == 2
     captured = capsys.readouterr()
     assert said in captured.err
     assert captured.out == ""
@@ -96,5 +104,5 @@ def test_wrong_usage_is_said_in_one_line(deaf: str, options: list[str], said: st
 
 def test_mistakes_are_findings(tmp_path: Path, capsys: Capture) -> None:
     path = Folder(tmp_path).write("wrong", "cast: {agent: {at: [1, 1]}}\noutcome: [{success: agent.flies}]\n")
-    assert main(["coverage", str(path)]) == 1
+    assert main(["check", str(path), *COVERAGE]) == 1
     assert "wrong.yaml:4" in capsys.readouterr().err

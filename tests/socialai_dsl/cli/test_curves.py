@@ -76,7 +76,7 @@ def test_seeds_of_one_condition_share_a_column_and_a_table(
     runs = [make_run(tmp_path, "talkitout", seed, 0.2 + seed / 10) for seed in (0, 1)]
     runs.append(make_run(tmp_path, "talkitout", 0, 0.9, bonus="lang"))
     picture = tmp_path / "curves.png"
-    assert main(["curves", *map(str, runs), "--out", str(picture)]) == 0
+    assert main(["report", *map(str, runs), "--curves", str(picture)]) == 0
     printed = capsys.readouterr().out
     assert "talkitout / ppo\n\n| frames | run 1 | run 2 | success@9 | timeout | ask |" in printed
     assert "| 0.00 M | 0.20 | 0.30 | 0.25 | 0.75 | 1.00 |" in printed
@@ -91,7 +91,7 @@ def test_runs_with_other_hyper_parameters_are_another_condition(
     runs = [make_run(tmp_path, "talkitout", seed, 0.5) for seed in (0, 1)]
     settings = json.loads((runs[1] / "config.json").read_text())
     (runs[1] / "config.json").write_text(json.dumps(settings | {"lr": 0.1, "entropy_coef": 0.02}))
-    assert main(["curves", *map(str, runs), "--out", str(tmp_path / "curves.png")]) == 0
+    assert main(["report", *map(str, runs), "--curves", str(tmp_path / "curves.png")]) == 0
     printed = capsys.readouterr().out
     assert "talkitout / ppo\n" in printed
     assert "talkitout / ppo, lr=0.1, entropy_coef=0.02\n" in printed
@@ -110,12 +110,12 @@ def test_titles_tell_conditions_apart_that_differ_in_their_last_option(tmp_path:
 
 
 def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["curves", str(tmp_path)]) == 2
+    assert main(["report", str(tmp_path), "--curves", "c.png"]) == 2
     assert "expected the folder of a run, with its config.json" in capsys.readouterr().err
 
 
 def test_an_empty_log_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = make_run(tmp_path, "talkitout", 0, 0.5)
     (run / "metrics.jsonl").write_text("")
-    assert main(["curves", str(run), "--out", str(tmp_path / "c.png")]) == 2
+    assert main(["report", str(run), "--curves", str(tmp_path / "c.png")]) == 2
     assert "expected the folder of a run that has learned" in capsys.readouterr().err

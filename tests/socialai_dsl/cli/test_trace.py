@@ -14,6 +14,8 @@ from tests.tiny import Folder
 
 Capture = pytest.CaptureFixture[str]
 
+COVERAGE = ["--part", "coverage", "--seconds", "0"]
+
 SHY = """
 frames:
   shy:
@@ -175,8 +177,8 @@ def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
     trace = Trace.model_validate_json(capsys.readouterr().out)
     assert trace.agent == "trained"
     assert len(trace.moments) == 4 or trace.moments[-1].ended
-    assert main(["coverage", shy, "--agent", "trained", "--episodes", "5", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["episodes"] == {"trained": 5}
+    assert main(["check", shy, "--agent", "trained", "--episodes", "5", "--json", *COVERAGE]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["episodes"] == {"trained": 5}
     assert main(["trace", "dance", "--agent", str(Path("trained").resolve())]) == 2
     assert "checkpoint is for" in capsys.readouterr().err
 

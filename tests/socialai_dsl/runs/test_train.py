@@ -1,6 +1,7 @@
 """Runs in Python: what `socialai-run` does, without a word."""
 
 import json
+import shutil
 import threading
 from pathlib import Path
 from typing import Any
@@ -104,3 +105,32 @@ def test_options_in_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         file.write_text(text)
         assert run_main(["--config", str(file)]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ("scenario", r"lacks its copy of the scenario, scenario/mine\.yaml; copy the folder as a whole"),
+        ("metrics.jsonl", r"lacks its metrics\.jsonl; copy the folder as a whole"),
+        ("checkpoints", "nothing to resume, there are no checkpoints"),
+        ("config.json", "is not a run's folder, it has no config"),
+    ],
+)
+def test_a_folder_that_was_copied_in_part(missing: str, said: str, half: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(half, tmp_path / "copy")
+    found = folder / missing
+    shutil.rmtree(found) if found.is_dir() else found.unlink()
+    before = {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    with pytest.raises(UsageError, match=said):
+        sd.resume(folder)
+    after = {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    assert before.items() <= after.items(), "nothing is lost"
+
+
+@pytest.fixture(scope="module")
+def half(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run of a scenario of one's own."""
+    place = tmp_path_factory.mktemp("own")
+    (place / "mine.yaml").write_text("scenario: mine\nextends: help\n")
+    options = {**QUICK, "frames": 256, "recipe": "plain"}
+    return sd.train(place / "mine.yaml", out=place / "run", **options).folder
