@@ -111,7 +111,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "runs": (
         TEXT_SIDE
         | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "replay", "evaluation"}
-        | {"baselines", "reporting", "runs.folder", "runs.options", "runs.versions"},
+        | {"baselines", "experiments", "reporting", "runs.folder", "runs.options", "runs.versions"},
         {"pydantic", "yaml", "trainer"},
     ),
     "experiments": (
@@ -120,7 +120,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"pydantic", "ray", "submitit", "yaml", CONFIG, FILES, SHIPPED},
     ),
     "reporting": (
-        {"atomic", "errors", "experiments", "baselines", "runs.folder"},
+        {"errors", "experiments", "baselines", "runs.folder"},
         {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),

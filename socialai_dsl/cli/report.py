@@ -8,7 +8,6 @@ from typing import Final
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.curves import draw_curves
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.runs.report import report, require_libraries
 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 
@@ -39,6 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the page, or the curves alone."""
+    from socialai_dsl.runs.report import report, require_libraries
+
     require_libraries()
     if arguments.curves is not None:
         refuse(arguments, ("out", "no_baselines"), "--curves draws the curves alone, into its own FILE")

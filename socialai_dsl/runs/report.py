@@ -66,13 +66,9 @@ def require_libraries() -> None:
     Raises:
         UsageError: a library is not installed.
     """
-    try:
-        import jinja2  # noqa: F401
-        import matplotlib  # noqa: F401
-        import pandas  # noqa: F401
-        import scipy  # noqa: F401
-    except ImportError as error:
-        raise UsageError(f"reports need {error.name}: pip install 'socialai-dsl[report]'") from None
+    for library in ("jinja2", "matplotlib", "pandas", "scipy"):
+        if importlib.util.find_spec(library) is None:
+            raise UsageError(f"reports need {library}: pip install 'socialai-dsl[report]'")
 
 
 def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
