@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.checking.briefing import brief
+from socialai_dsl.llm import Episode
 from socialai_dsl.llm.view import LastStep, Style, TextView
+from socialai_dsl.play.game import Game
 from socialai_dsl.program import Header, LineColumn, Program
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.vocabulary import composed
@@ -47,6 +50,21 @@ def differ_alike(program: Program) -> bool:
     """Whether lines differ as tokens exactly if they differ as they look."""
     lines = set(lines_of(program))
     return len(lines) == len({look for look, _ in lines}) == len({tokens for _, tokens in lines})
+
+
+@pytest.mark.parametrize("name", one_in(12, [*shipped(), *SUITES], "compiles every scenario"))
+def test_what_is_for_authors_reaches_no_player(name: str) -> None:
+    """`about` and `notes` often say the hypothesis."""
+    loaded = sd.load(name)
+    data = loaded.resolved.data
+    assert isinstance(data, dict)
+    game, episode = Game(name), Episode(sd.compile(loaded), briefing=brief(loaded))
+    game.begin("", {"seed": 0})
+    told = " ".join([episode.reset(seed=0), episode.instructions, game.task, game.explanation, game.now.seen])
+    for key in ("about", "notes"):
+        assert str(data.get(key, "nothing of the kind")).strip() not in told
+    assert game.task in episode.instructions, "people and models are told the same words"
+    game.close(), episode.close()
 
 
 def members(program: Playable) -> tuple[Program, ...]:

@@ -20,7 +20,8 @@ def refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str], 
         otherwise: what is added where none of them is near.
     """
     for name, given in unknown.items():
-        hint = suggested(str(name), known, f"; expected some of {', '.join(known)}{otherwise}", repr)
+        listed = f"some of {', '.join(known)}" if known else "none"
+        hint = suggested(str(name), known, f"; expected {listed}{otherwise}", repr)
         raise ValueError(f"{name}: got {given!r}, but {call} has no such option{hint}")
 
 

@@ -14,7 +14,9 @@ import pytest
 from starlette.websockets import WebSocketDisconnect
 
 import socialai_dsl.llm as llm
-from socialai_dsl.envs.factory import playable_of
+from socialai_dsl.checking.briefing import brief
+from socialai_dsl.envs.factory import compiled, playable_of
+from socialai_dsl.frontend import load
 from socialai_dsl.llm import Episode
 from tests.socialai_dsl.llm.stand_ins import OPENENV, Model, TaskState, inspect_ai
 
@@ -86,6 +88,15 @@ def test_a_request_that_cannot_be_done_is_answered_with_a_sentence(client: TestC
         pass
 
 
+def test_a_session_is_told_of_the_task(openenv: Any) -> None:
+    loaded = load("novel/fetch")
+    for options in ({}, {"language": "de"}, {"tell": "nothing"}, {"goal": "Help."}):
+        briefing = brief(loaded, **options)  # type: ignore[arg-type]
+        env = openenv.ScenarioEnvironment(compiled(loaded), "prose", briefing)
+        assert env.reset(seed=7).instructions.endswith(briefing.text())
+        env.close()
+
+
 def test_a_session_that_lost_its_place_says_so(openenv: Any) -> None:
     env = openenv.ScenarioEnvironment(playable_of("talkitout"), "prose")
     env.reset(seed=7)
@@ -114,7 +125,11 @@ def test_json_of_any_form_is_a_reply(openenv: Any, action: Any, message: str) ->
 def test_a_sample_is_played_to_its_end() -> None:
     model = Model([("hm", "stop"), ("I see", "max_tokens"), ("", "unknown"), ("Act: left", "stop")])
     with imported("inspect_task", inspect_ai(model)) as module:
+        told = module.scenario("novel/fetch", episodes=1, language="de")
+        assert told.metadata["language"] == "de"
+        assert told.metadata["told"].startswith("Jemand in diesem Raum")
         task = module.scenario(episodes=2)
+        assert task.metadata["tell"] == "nothing"
         states = [TaskState(sample.metadata) for sample in task.dataset]
         for state in states:
             asyncio.run(task.solver(state, None))
