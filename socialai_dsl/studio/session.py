@@ -267,13 +267,14 @@ class Session:
         before, tracing.thought = tracing.tracer.counts(), thought
         image = stage.observations[AGENT]["image"][0].copy()
         try:
-            stage.step({AGENT: action})
+            step = stage.step({AGENT: action})
         except (ValueError, RoomError) as error:
             who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
         more = tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)
         movement = (*stage.env.program.actions, None)[action[0, 0]]
-        return {"more": more, "seat": self._seat(LastStep(movement, image))}
+        success = bool(step.success[0]) if step.ended[0] else None
+        return {"more": more, "seat": self._seat(LastStep(movement, image, success))}
 
     def _seat(self, last: LastStep | None = None) -> Reply:
         """What whoever plays is told, sees and hears, as a language model reads it."""

@@ -184,7 +184,7 @@ def test_each_member_of_a_suite_has_its_own(tmp_path: Path) -> None:
     told = set()
     for number in range(20):
         episode.reset(test_episode=number)
-        told.add(episode.instructions.rpartition("at most. ")[2])
+        told.add(episode.instructions.rpartition("turns. ")[2])
     assert told == {"Go.", UNTOLD}
 
 

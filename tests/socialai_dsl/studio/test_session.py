@@ -58,7 +58,7 @@ def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path
         assert seat["seen"] == model.reset(3)
         assert seat["told"] == f"An episode ends with success, with failure, or after 100 turns. {told}"
         assert seat["compass"]
-        for movement in ("left", *["forward"] * 8, "left"):
+        for movement in ("left", *["forward"] * 8, "done"):
             assert session.act(movement)["seat"]["seen"] == model.step(f"Act: {movement}").text
 
 
