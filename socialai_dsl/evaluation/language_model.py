@@ -66,6 +66,7 @@ def let_a_model_play(
     out: Path,
     options: ModelOptions,
     briefing: Briefing,
+    trials: int = 1,
 ) -> ModelEpisodes:
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
@@ -78,6 +79,7 @@ def let_a_model_play(
         out: gets `SCENARIO/transcripts`.
         options: how it is asked.
         briefing: what it is told of the task.
+        trials: how many episodes in a row are one conversation.
 
     Raises:
         UsageError: the endpoint does not answer, or an option is not what was expected.
@@ -90,7 +92,8 @@ def let_a_model_play(
     from socialai_dsl.llm.view import TextView
 
     endpoint = _endpoint(agent, options)
-    manner = Manner(**{field.name: getattr(options, field.name) for field in fields(Manner)})
+    asked: dict[str, Any] = {field.name: getattr(options, field.name, trials) for field in fields(Manner)}
+    manner = Manner(**asked)
     names = probe_names(loaded) if manner.probes != "off" else ()
     budget = _budget(options.budget, endpoint.prices)
     settings = {

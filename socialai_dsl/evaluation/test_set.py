@@ -1,7 +1,7 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -198,9 +198,17 @@ def play_test_set(
     if player.is_model:
         assert player.options is not None, "internal: a language model has options"
         played = let_a_model_play(
-            player.agent, scenario, loaded, program, episodes, player.kept_in, player.options, briefing
+            player.agent,
+            scenario,
+            loaded,
+            program,
+            episodes,
+            player.kept_in,
+            player.options,
+            briefing,
+            trials,
         )
-        return _of_model(played, scenario, loaded, program, player, briefing)
+        return replace(_of_model(played, scenario, loaded, program, player, briefing), trials=trials)
     if player.is_trained:
         require_trainer()
     envs = make_vec(
@@ -341,7 +349,10 @@ def _of_person(
     )
     actions = {number: p.actions for number, p in enumerate(played)}
     endings = endings_of(loaded, program)
-    return Evaluation(scenario, loaded, program, player, result, endings, actions, briefing=briefing)
+    # A person remembers every episode of the session.
+    return Evaluation(
+        scenario, loaded, program, player, result, endings, actions, trials=len(played), briefing=briefing
+    )
 
 
 def _trial(successes: int, episodes: int) -> dict[str, Any]:

@@ -50,6 +50,7 @@ class Manner:
         grammar: whether replies are held to a grammar, which llama.cpp's server understands.
         probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
             kept like other messages, or not at all.
+        trials: how many episodes in a row are one conversation, in which the model is told how each ended.
     """
 
     style: Style = "prose"
@@ -58,6 +59,7 @@ class Manner:
     history: int | None = WHOLE
     grammar: bool = False
     probes: Probing = "apart"
+    trials: int = 1
 
     @property
     def of_episodes(self) -> dict[str, Any]:
@@ -164,6 +166,7 @@ def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpis
     """
     try:
         settings = json.loads((folder / _SETTINGS).read_text(encoding="utf-8"))
+        settings = {"trials": 1} | settings  # older ones know of no sessions
         manner = Manner(**{field.name: settings[field.name] for field in fields(Manner)})
     except (FileNotFoundError, ValueError, KeyError, TypeError):
         raise OtherSettings(f"{folder} holds no transcripts of episodes") from None
@@ -242,7 +245,8 @@ class LanguageModelPlayer:
         budget: Budget,
         progress: Callable[[PlayedEpisode], None] | None,
     ) -> list[PlayedEpisode]:
-        waiting = iter(range(episodes))
+        trials = self._manner.trials
+        sessions = iter(range(0, episodes, trials))
         played: list[PlayedEpisode] = []
         failures: list[Exception] = []
 
@@ -251,16 +255,21 @@ class LanguageModelPlayer:
                 self._program, **self._manner.of_episodes, briefing=self._briefing, probes=self._loaded
             )
             try:
-                for number in waiting:
-                    path = self._place(number)
-                    _mend(path)
-                    conversation = Conversation(episode, self._manner, number, path)
-                    # After a failure the others play what they have asked for, which is paid for, and stop as well.
-                    while not (conversation.done or failures or budget.is_spent(self._spent)):
-                        conversation.add(await self._ask(client, conversation))
-                    played.append(conversation.played())
-                    if progress is not None:
-                        progress(played[-1])
+                for first in sessions:
+                    before: Conversation | None = None
+                    for number in range(first, first + trials):
+                        path = self._place(number)
+                        _mend(path)
+                        conversation = Conversation(episode, self._manner, number, path, before)
+                        # After a failure the others play what they have asked for, which is paid for, and stop as well.
+                        while not (conversation.done or failures or budget.is_spent(self._spent)):
+                            conversation.add(await self._ask(client, conversation))
+                        played.append(conversation.played())
+                        if progress is not None:
+                            progress(played[-1])
+                        if not conversation.done:
+                            break
+                        before = conversation
             except (EndpointError, OSError) as error:
                 failures.append(error)
             finally:
@@ -296,12 +305,15 @@ class Conversation:
         manner: how the model plays.
         number: of the test episode.
         path: of the transcript, a line of JSON for each reply.
+        before: that of the trial before in the same session, which this one goes on with.
 
     Raises:
         OSError: the transcript cannot be read.
     """
 
-    def __init__(self, episode: Episode, manner: Manner, number: int, path: Path) -> None:
+    def __init__(
+        self, episode: Episode, manner: Manner, number: int, path: Path, before: Conversation | None = None
+    ) -> None:
         self._episode = episode
         self._manner = manner
         self._number = number
@@ -309,8 +321,11 @@ class Conversation:
         self._usage = Usage()
         self._stops: Counter[str] = Counter()
         self._before = episode.env.counters()["rules"]
-        self._text = episode.reset(test_episode=number)
-        self._exchanges: list[list[Mapping[str, Any]]] = []
+        closing = "" if before is None else f"{before.closing}\n\n"
+        trial, trials = number % manner.trials + 1, manner.trials
+        heading = f"Episode {trial} of {trials} begins, in a room of its own.\n" if trials > 1 else ""
+        self._text = f"{closing}{heading}{episode.reset(test_episode=number)}"
+        self._exchanges: list[list[Mapping[str, Any]]] = [] if before is None else [*before.exchanges]
         self._replies: list[list[tuple[str, str]]] = [[]]
         for record in _records(path):
             if self.done:
@@ -321,6 +336,17 @@ class Conversation:
     def done(self) -> bool:
         """Whether nothing is left to be played or asked."""
         return bool(self._episode.result().ending) and self._episode.question is None
+
+    @property
+    def exchanges(self) -> Sequence[list[Mapping[str, Any]]]:
+        """What was said, observation by observation, earlier trials included."""
+        return self._exchanges
+
+    @property
+    def closing(self) -> str:
+        """What the model is told at the end, to which no reply is asked for."""
+        cut_short = self._episode.result().ending in CUT_SHORT
+        return f"{self._text}\nThe episode is over, without success." if cut_short else self._text
 
     @property
     def begun(self) -> bool:
@@ -338,7 +364,13 @@ class Conversation:
             {"role": "user", "content": text},
         ]
         first = {**shown[0], "content": f"{told}{shown[0]['content']}"}
-        return [{"role": "system", "content": self._episode.instructions}, first, *shown[1:]]
+        instructions = self._episode.instructions
+        if self._manner.trials > 1:
+            instructions += (
+                f"\n\nYou play {self._manner.trials} episodes in a row, each in a room of its own, and are told how "
+                "each ended. What you find out in one may help you in the next."
+            )
+        return [{"role": "system", "content": instructions}, first, *shown[1:]]
 
     def constraints(self) -> dict[str, Any]:
         """The constraints of a request on the form of the reply."""

@@ -104,6 +104,28 @@ def test_a_model_that_knows_the_script_does_what_the_script_does(tmp_path: Path,
     assert f"{10 * replies:,} read and {2 * replies:,} written" in printed
 
 
+def test_a_session_of_several_trials_is_one_conversation(tmp_path: Path, capsys: Capture) -> None:
+    """The model is shown all of the session, is told how episodes ended, and results are told by trial."""
+    with endpoint(lambda request: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path, "--trials", "2", on="dance", episodes=4) == 0
+        asked = len(stub.requests)
+        assert evaluate(stub.url, tmp_path, "--trials", "2", on="dance", episodes=4) == 0
+        assert len(stub.requests) == asked, "what was played is read from the transcripts"
+        assert evaluate(stub.url, tmp_path, on="dance", episodes=4) == 2, "these transcripts are of sessions"
+    assert "another trials" in capsys.readouterr().err
+    told = [[message["content"] for message in request["messages"]] for request in stub.requests]
+    assert all("You play 2 episodes in a row" in messages[0] for messages in told)
+    longest = max(told, key=len)
+    assert longest[1].startswith("Episode 1 of 2 begins")
+    second = [text for text in longest if "Episode 2 of 2 begins" in text]
+    assert len(second) == 1
+    assert "The episode is over" in second[0].split("Episode 2 of 2 begins")[0]
+    assert len(longest) == 2 * 2 * 20, "system, and two messages for each step of two episodes but the last"
+    result = figures(tmp_path, "dance")
+    assert result["trials"] == 2
+    assert [trial["episodes"] for trial in result["eval"]["trials"]] == [2, 2]
+
+
 TOLD = """\
 scenario: told
 about: The hypothesis is not told.
