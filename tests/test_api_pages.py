@@ -21,7 +21,7 @@ SHOWN = {
         "socialai_dsl.episodes",
         "socialai_dsl.evaluation",
         "socialai_dsl.llm",
-        "socialai_dsl.replay",
+        "socialai_dsl.traces",
     ],
 )
 def test_every_public_name_has_its_place(module: str) -> None:

@@ -80,24 +80,24 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "envs"},
         {"numpy"},
     ),
-    "replay": (
+    "traces": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "envs", "render"},
         {"numpy", "pydantic", "PIL"},
     ),
     "episodes": (
-        TEXT_SIDE | {"errors", "program", "program_suite", "envs", "render", "replay"},
+        TEXT_SIDE | {"errors", "program", "program_suite", "envs", "render", "traces"},
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (
         TEXT_SIDE
-        | {"errors", "program", "program_suite", "engine", "envs", "render", "replay", "episodes"}
+        | {"errors", "program", "program_suite", "engine", "envs", "render", "traces", "episodes"}
         | {"llm"},
         {"numpy", "rich", "textual"},
     ),
     "evaluation": (
         TEXT_SIDE
         | {"errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
-        | {"episodes", "replay", "llm", "play", "experiments", "runs.folder", "runs.versions"},
+        | {"episodes", "traces", "llm", "play", "experiments", "runs.folder", "runs.versions"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
     "llm": (
@@ -110,7 +110,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "runs": (
         TEXT_SIDE
-        | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "replay", "evaluation"}
+        | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "traces", "evaluation"}
         | {"baselines", "experiments", "reporting", "runs.folder", "runs.options", "runs.versions"},
         {"pydantic", "yaml", "trainer"},
     ),

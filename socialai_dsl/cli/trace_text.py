@@ -13,7 +13,7 @@ from socialai_dsl.diagnostics import printable
 from socialai_dsl.episodes.play import Observer, Rooms, Step
 from socialai_dsl.episodes.traces import TracedEpisode
 from socialai_dsl.program_suite import outcome_name
-from socialai_dsl.replay.state import cast_of, changes, found, present
+from socialai_dsl.traces.state import cast_of, changes, found, present
 from socialai_dsl.vocabulary import spelt
 
 _WIDTH: Final = 100

@@ -16,8 +16,8 @@ from socialai_dsl.episodes.play import Step as RoomStep
 from socialai_dsl.episodes.policies import ReplayedPolicy
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
-from socialai_dsl.replay.endings import Ending
-from socialai_dsl.replay.steps import Step, describe_step
+from socialai_dsl.traces.endings import Ending
+from socialai_dsl.traces.steps import Step, describe_step
 
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500

@@ -23,10 +23,10 @@ from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
-from socialai_dsl.replay.document import Outcome, Thought, Trace
-from socialai_dsl.replay.endings import endings_of
-from socialai_dsl.replay.state import cast_of
-from socialai_dsl.replay.tracing import Action, Answers, Tracer
+from socialai_dsl.traces.document import Outcome, Thought, Trace
+from socialai_dsl.traces.endings import endings_of
+from socialai_dsl.traces.state import cast_of
+from socialai_dsl.traces.tracing import Action, Answers, Tracer
 
 Think = Callable[[Mapping[str, NDArray[Any]]], Thought | None]
 """What an agent makes of an observation; asked in each moment before a step, in order."""

@@ -26,8 +26,8 @@ from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.questions import score
 from socialai_dsl.program_suite import Playable
-from socialai_dsl.replay.endings import Ending
 from socialai_dsl.runs.folder import scenario_folder_name
+from socialai_dsl.traces.endings import Ending
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint

@@ -25,10 +25,10 @@ from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_mo
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
-from socialai_dsl.replay import Thought, Trace
-from socialai_dsl.replay.document import Outcome
-from socialai_dsl.replay.endings import Ending, endings_of, short_name
 from socialai_dsl.runs.folder import scenario_folder_name
+from socialai_dsl.traces import Thought, Trace
+from socialai_dsl.traces.document import Outcome
+from socialai_dsl.traces.endings import Ending, endings_of, short_name
 
 if TYPE_CHECKING:  # it needs Textual
     from socialai_dsl.play.game import FinishedEpisode

@@ -20,9 +20,9 @@ from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, outcome_name
 from socialai_dsl.render.panel import DialogueLine
-from socialai_dsl.replay.endings import Ending, endings_of
-from socialai_dsl.replay.state import cast_of, present
-from socialai_dsl.replay.steps import describe_step
+from socialai_dsl.traces.endings import Ending, endings_of
+from socialai_dsl.traces.state import cast_of, present
+from socialai_dsl.traces.steps import describe_step
 from socialai_dsl.vocabulary import spelt
 
 Sight = Literal["seat", "room"]

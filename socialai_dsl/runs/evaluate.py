@@ -26,7 +26,6 @@ from socialai_dsl.episodes.players import (
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
 from socialai_dsl.frontend import load
-from socialai_dsl.replay.endings import short_name
 from socialai_dsl.runs.copies import keep_scenario
 from socialai_dsl.runs.folder import (
     CONFIG,
@@ -41,6 +40,7 @@ from socialai_dsl.runs.folder import (
 from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
+from socialai_dsl.traces.endings import short_name
 from trainer.config import RunConfig
 
 _PLAYER: Final = ("greedy", "seed", "device", "net")

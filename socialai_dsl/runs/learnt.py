@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.replay.endings import Ending
+from socialai_dsl.traces.endings import Ending
 
 _UTTERANCES_SHOWN: Final = 2
 

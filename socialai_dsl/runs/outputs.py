@@ -7,7 +7,6 @@ from typing import Any, Final
 from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.evaluation.test_set import Evaluation
-from socialai_dsl.replay.page import replay_page
 from socialai_dsl.runs.folder import (
     CARD,
     CURVE,
@@ -19,6 +18,7 @@ from socialai_dsl.runs.folder import (
     scenario_folder_name,
 )
 from socialai_dsl.runs.model_card import model_card
+from socialai_dsl.traces.page import replay_page
 from trainer.config import RunConfig
 
 _REPLAYED: Final = 5

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.evaluation.test_set import Evaluation
-from socialai_dsl.replay.page import replay_page
 from socialai_dsl.runs.folder import EPISODES, REPLAY, only_writer, scenario_folder_name
+from socialai_dsl.traces.page import replay_page
 
 
 def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:

@@ -22,10 +22,10 @@ from socialai_dsl.evaluation.test_set import (
     play_test_set,
 )
 from socialai_dsl.frontend import load
-from socialai_dsl.replay import Trace
-from socialai_dsl.replay.page import replay_page
 from socialai_dsl.runs.evaluate import made_player, own_scenario
 from socialai_dsl.runs.folder import CONFIG
+from socialai_dsl.traces import Trace
+from socialai_dsl.traces.page import replay_page
 
 REPLAYED: Final = 5
 """The number of successes, and of failures, that are kept."""

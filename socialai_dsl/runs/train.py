@@ -21,7 +21,6 @@ from socialai_dsl.errors import OptionError, RunFailed, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
-from socialai_dsl.replay.endings import endings_of, short_name
 from socialai_dsl.runs.copies import keep_run
 from socialai_dsl.runs.evaluate import result_of
 from socialai_dsl.runs.folder import (
@@ -39,6 +38,7 @@ from socialai_dsl.runs.learnt import Learnt
 from socialai_dsl.runs.options import continued_config, new_config
 from socialai_dsl.runs.outputs import draw_curve, record_run, training_figures, write_card
 from socialai_dsl.runs.stopping import Stop
+from socialai_dsl.traces.endings import endings_of, short_name
 from trainer.config import UNTRAINED, RunConfig
 from trainer.files import checkpoint_files
 

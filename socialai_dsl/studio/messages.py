@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from socialai_dsl.replay.document import Trace
+from socialai_dsl.traces.document import Trace
 
 LARGEST_MESSAGE: Final = 2 << 20
 """Characters of a message from a window; longer ones are refused."""

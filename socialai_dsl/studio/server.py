@@ -18,7 +18,6 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from socialai_dsl.replay.scripts import static_text
 from socialai_dsl.studio import MOST_WINDOWS
 from socialai_dsl.studio.engine import EngineLostError, start_worker
 from socialai_dsl.studio.files import Folder
@@ -26,6 +25,7 @@ from socialai_dsl.studio.language import serve_editor
 from socialai_dsl.studio.messages import LARGEST_MESSAGE
 from socialai_dsl.studio.window import Window, Windows, close
 from socialai_dsl.studio.worker import answer_window, serve_language
+from socialai_dsl.traces.scripts import static_text
 
 LARGEST_FRAME: Final = 32 * LARGEST_MESSAGE
 """Bytes of a message that is read at all; a longer one ends its connection."""

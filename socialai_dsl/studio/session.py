@@ -25,11 +25,11 @@ from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.replay import Thought, Tracer
-from socialai_dsl.replay.endings import endings_of
-from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
+from socialai_dsl.traces import Thought, Tracer
+from socialai_dsl.traces.endings import endings_of
+from socialai_dsl.traces.page import replay_page
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
 Reply = dict[str, Any]

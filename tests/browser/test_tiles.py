@@ -18,7 +18,7 @@ from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import SIZES, Mark
 from socialai_dsl.render.tiles import draw_tile
-from socialai_dsl.replay.scripts import bundled
+from socialai_dsl.traces.scripts import bundled
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

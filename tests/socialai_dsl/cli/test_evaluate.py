@@ -14,7 +14,7 @@ from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.episodes import EvalResult, wilson_interval
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.evaluation.test_set import Evaluation
-from socialai_dsl.replay.endings import Ending, endings_of
+from socialai_dsl.traces.endings import Ending, endings_of
 
 Capture = pytest.CaptureFixture[str]
 

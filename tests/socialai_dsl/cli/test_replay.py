@@ -14,8 +14,8 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.episodes import trace_of
-from socialai_dsl.replay import Trace
-from socialai_dsl.replay.page import replay_page
+from socialai_dsl.traces import Trace
+from socialai_dsl.traces.page import replay_page
 
 Capture = pytest.CaptureFixture[str]
 

@@ -9,7 +9,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main
-from socialai_dsl.replay.document import Trace
+from socialai_dsl.traces.document import Trace
 from tests.tiny import Folder
 
 Capture = pytest.CaptureFixture[str]

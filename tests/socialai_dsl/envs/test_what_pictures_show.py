@@ -26,7 +26,7 @@ from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.grid import draw_grid, figures
 from socialai_dsl.render.tiles import draw_tile
-from socialai_dsl.replay.state import cast_of
+from socialai_dsl.traces.state import cast_of
 from tests.quick import one_in
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"

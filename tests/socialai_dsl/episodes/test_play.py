@@ -180,7 +180,7 @@ def test_steps_are_taken_back_chance_included() -> None:
             seen.append(stage.observations[AGENT]["image"].tobytes())
         return seen
 
-    stage = Stage(sd.make("cointhief"))
+    stage = Stage(sd.make("talkitout"))
     stage.begin({"seed": 4})
     first = following(stage, 3)
     while stage.back():

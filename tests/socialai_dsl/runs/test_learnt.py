@@ -1,8 +1,8 @@
 """What an agent has learnt is said in the scenario's own words."""
 
 import socialai_dsl as sd
-from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.runs.learnt import Learnt
+from socialai_dsl.traces.endings import endings_of
 
 
 def learnt_of(name: str) -> Learnt:

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from socialai_dsl.replay.endings import short_file, short_name
-from socialai_dsl.replay.page import replay_page
+from socialai_dsl.traces.endings import short_file, short_name
+from socialai_dsl.traces.page import replay_page
 
 FORMAT: Final = "socialai-trace/1"
 

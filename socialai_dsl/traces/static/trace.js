@@ -1,5 +1,5 @@
 // @ts-check
-/** Reads the trace of an episode (`socialai-trace/1`, socialai_dsl/replay/document.py), which says of each moment what differs. */
+/** Reads the trace of an episode (`socialai-trace/1`, socialai_dsl/traces/document.py), which says of each moment what differs. */
 
 /** @typedef {import("./tiles.js").Look} Look */
 /** @typedef {import("./tiles.js").Gesture} Gesture */

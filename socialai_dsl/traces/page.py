@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final, Protocol
 
-from socialai_dsl.replay.scripts import bundled, static_text
+from socialai_dsl.traces.scripts import bundled, static_text
 
 _PAGE: Final = """<!doctype html>
 <html lang="en">

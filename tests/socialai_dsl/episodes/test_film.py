@@ -12,8 +12,8 @@ from PIL import Image
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.program import Program
 from socialai_dsl.render.panel import DialogueLine, Face
-from socialai_dsl.replay.endings import Ending
-from socialai_dsl.replay.steps import Step, describe_step
+from socialai_dsl.traces.endings import Ending
+from socialai_dsl.traces.steps import Step, describe_step
 from socialai_dsl.vocabulary import Sentences, Slot
 
 SENTENCES = Sentences.of(("Where is <noun>", "Hello"), (Slot("noun", ("the exit", "Ann")),))

@@ -13,11 +13,11 @@ from socialai_dsl.program import VIEW
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import Marks
-from socialai_dsl.replay import document
-from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
-from socialai_dsl.replay.state import leaves
-from socialai_dsl.replay.steps import describe_step, heard_line
 from socialai_dsl.semantics.terms import Const
+from socialai_dsl.traces import document
+from socialai_dsl.traces.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
+from socialai_dsl.traces.state import leaves
+from socialai_dsl.traces.steps import describe_step, heard_line
 from socialai_dsl.vocabulary import NOUN
 
 Action = NDArray[np.int64]

@@ -13,7 +13,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.episodes import trace_of
 from socialai_dsl.program_suite import outcome_name
-from socialai_dsl.replay import Thought, Trace, Tracer, trace_schema
+from socialai_dsl.traces import Thought, Trace, Tracer, trace_schema
 from tests.quick import one_in
 from tests.tiny import Folder
 
