@@ -60,7 +60,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"yaml", "pydantic", "pydantic_core"},
     ),
     "library": (TEXT_SIDE - {"frontend", "checking"}, {"pydantic"}),
-    "checking": (TEXT_SIDE - {"frontend"}, {SHIPPED}),
+    "checking": (TEXT_SIDE - {"frontend"} | {"errors"}, {SHIPPED}),
     "frontend": (TEXT_SIDE, set()),
     "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "vocabulary", "widths"}, {"numpy"}),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
+from socialai_dsl.errors import OptionError
 from socialai_dsl.schema.scenario import Instructions
 
 Tell = Literal["nothing", "instructions", "goal"]
@@ -55,26 +56,26 @@ def brief(
         language: a tag such as `en`, of instructions in several languages; None: the one that is written first.
 
     Raises:
-        ValueError: there is nothing of that kind to be told, or an argument goes with another `tell`.
+        OptionError: there is nothing of that kind to be told, or an argument goes with another `tell`.
     """
     if tell is not None and tell not in get_args(Tell):
-        raise ValueError(f"tell: got {tell!r}, expected one of {', '.join(get_args(Tell))}")
+        raise OptionError("tell", f"got {tell!r}, expected one of {', '.join(get_args(Tell))}")
     if not goal.isascii() and goal.encode(errors="ignore").decode() != goal:
-        raise ValueError(f"goal: got {goal!r}, expected a text in Unicode")
+        raise OptionError("goal", f"got {goal!r}, expected a text in Unicode")
     written = _instructions(loaded)
     tell = tell or ("goal" if goal else "instructions" if written else "nothing")
     if bool(goal.strip()) != (tell == "goal"):
         expected = "none" if goal.strip() else "a sentence about the aim"
-        raise ValueError(f"goal: got {goal!r} and tell {tell!r}, expected {expected}")
+        raise OptionError("goal", f"got {goal!r} and tell {tell!r}, expected {expected}")
     if language is not None and tell != "instructions":
-        raise ValueError(
-            f"language: got {language!r} and tell {tell!r}, expected none: instructions alone have one"
+        raise OptionError(
+            "language", f"got {language!r} and tell {tell!r}, expected none: instructions alone have one"
         )
     if tell != "instructions":
         return Briefing(tell, goal)
     if loaded is None or not written:
         name = "a program" if loaded is None else loaded.name
-        raise ValueError(f"tell: got 'instructions', but {name} has none; expected nothing or goal")
+        raise OptionError("tell", f"got 'instructions', but {name} has none; expected nothing or goal")
     chosen = {member: _in_language(one, language, member) for member, one in written.items()}
     words = {member: text for member, (text, _) in chosen.items()}
     languages = {tag for _, tag in chosen.values()}
@@ -101,12 +102,12 @@ def _in_language(written: Instructions, language: str | None, name: str) -> tupl
     """The text in a language, and which one that is.
 
     Raises:
-        ValueError: it is not written in this language.
+        OptionError: it is not written in this language.
     """
     texts = {"": written} if isinstance(written, str) else written
     if language is None:
         return next((text, tag) for tag, text in texts.items())
     if language not in texts:
         known = f"are in {', '.join(texts)}" if "" not in texts else "do not say in which language they are"
-        raise ValueError(f"language: got {language!r}, but the instructions of {name} {known}")
+        raise OptionError("language", f"got {language!r}, but the instructions of {name} {known}")
     return texts[language], language

@@ -1,19 +1,13 @@
 """Options that several commands have, and numbers on the command line."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import re
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.errors import UsageError
-
-if TYPE_CHECKING:
-    from socialai_dsl.checking.briefing import Briefing
-    from socialai_dsl.checking.loaded import Loaded
 
 STYLE: Final[dict[str, Any]] = {
     "choices": ("prose", "grid", "json"),
@@ -57,20 +51,6 @@ def tell_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """What was typed of these, as `brief` takes it."""
     given = {name: getattr(arguments, name) for name in TELL_OPTIONS}
     return {name: value for name, value in given.items() if value is not None}
-
-
-def brief_as_typed(loaded: Loaded, arguments: argparse.Namespace) -> Briefing:
-    """What is to be told of a scenario or suite.
-
-    Raises:
-        UsageError: there is nothing of that kind to be told.
-    """
-    from socialai_dsl.checking.briefing import brief
-
-    try:
-        return brief(loaded, **tell_options(arguments))
-    except ValueError as error:
-        raise UsageError(str(error)) from None
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:

@@ -20,7 +20,7 @@ from socialai_dsl.episodes.policies import (
     RandomPolicy,
     ScriptedPolicy,
 )
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
 from trainer.config import UNTRAINED
@@ -146,16 +146,13 @@ class Player:
         """What is told of a scenario or suite before the first observation.
 
         Raises:
-            UsageError: there is nothing of that kind to be told, or the player reads nothing.
+            OptionError: there is nothing of that kind to be told, or the player reads nothing.
         """
         if not (self.is_model or self.is_person):
             if self.tell is not None or self.goal or self.language is not None:
-                raise UsageError(f"tell: the agent {self.agent!r} reads nothing")
+                raise OptionError("tell", f"the agent {self.agent!r} reads nothing")
             return NO_BRIEFING
-        try:
-            return brief(loaded, self.tell, self.goal, self.language)
-        except ValueError as error:
-            raise UsageError(str(error)) from None
+        return brief(loaded, self.tell, self.goal, self.language)
 
     @property
     def kept_in(self) -> Path:

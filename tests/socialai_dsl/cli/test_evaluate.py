@@ -129,7 +129,10 @@ def test_what_does_not_fit_is_refused_and_the_rest_is_kept(
         (["oracle", "--on", "help", "--goal", "Go."], "--goal: the agent 'oracle' has no use for it"),
         (["runs/x", "--on", "help", "--language", "de"], "--language: the agent 'runs/x' has no use for it"),
         (["llm:m", "--on", "help", "--view", "room"], "--view: the agent 'llm:m' has no use for it"),
-        (["human", "--on", "help", "--tell", "instructions"], "tell: got 'instructions', but help has none"),
+        (
+            ["human", "--on", "help", "--tell", "instructions"],
+            "--tell: got 'instructions', but help has none",
+        ),
     ],
 )
 def test_wrong_usage(arguments: list[str], message: str, capsys: Capture) -> None:

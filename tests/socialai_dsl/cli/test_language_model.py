@@ -517,7 +517,7 @@ def test_the_key_is_sent_and_appears_nowhere(tmp_path: Path, capsys: Capture, ca
         (["--budget", "much"], "--budget: got 'much', expected an amount such as 200000 or 2.50usd"),
         (["--base-url", "http://127.0.0.1:99999/v1"], "--base-url: got 'http://127.0.0.1:99999/v1'"),
         (["--base-url", "http://[::1"], "--base-url: got 'http://[::1'"),
-        (["--goal", "\udcff"], "goal: got '\\udcff', expected a text in Unicode"),
+        (["--goal", "\udcff"], "--goal: got '\\udcff', expected a text in Unicode"),
         (["--budget", "1usd"], "--budget: an amount of money needs --prices"),
         (["--prices", "1"], "--prices: got '1', expected two amounts such as 0.15,0.60"),
     ],

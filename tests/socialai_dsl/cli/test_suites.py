@@ -59,8 +59,10 @@ def test_the_scripts_of_a_suite(capsys: Capture) -> None:
     assert "the agent of errands has no frame" in capsys.readouterr().err
 
 
-@pytest.mark.thorough("compiles suites")
-def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def person(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody at a terminal who gives up each episode at once."""
+
     async def keys(app: PlayApp) -> None:
         async with app.run_test() as pilot:
             await pilot.press(*["x", "n"] * 12, "q")
@@ -71,6 +73,42 @@ def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("socialai_dsl.play._require_terminal", lambda: None)
     monkeypatch.setattr(PlayApp, "run", run)
+
+
+@pytest.mark.usefixtures("person")
+@pytest.mark.parametrize(
+    ("options", "granted"),
+    [
+        ([], {"tell": "nothing", "view": "seat"}),
+        (["--goal", "Help.", "--view", "room"], {"tell": "goal", "told": "Help.", "view": "room"}),
+    ],
+)
+def test_what_a_person_was_told_and_saw_is_recorded(options: list[str], granted: dict[str, str]) -> None:
+    command = [
+        "evaluate",
+        "human",
+        "--on",
+        "talkitout",
+        "--episodes",
+        "2",
+        "--record",
+        "0",
+        "--out",
+        "people",
+    ]
+    assert main([*command, *options]) == 0
+    (session,) = Path("people").iterdir()
+    result = json.loads((session / "talkitout" / "result.json").read_text())
+    begun, *events = map(json.loads, (session / "talkitout" / "played.jsonl").read_text().splitlines())
+    for recorded in (result, begun):
+        assert {key: recorded[key] for key in ("tell", "told", "view") if key in recorded} == granted
+    titles = {event["title"] for event in events if event["event"] == "episode"}
+    assert all(("talkitout" in title) == (granted["view"] == "room") for title in titles)
+
+
+@pytest.mark.usefixtures("person")
+@pytest.mark.thorough("compiles suites")
+def test_a_person_plays_members() -> None:
     assert run_main(["pair.yaml?split=test", "--agent", "human", "--eval-episodes", "8", "--out", "run"]) == 0
     result = json.loads(Path("run/result.json").read_text())
     assert sum(result["eval"]["outcomes"].values()) == pytest.approx(1)
