@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -163,7 +163,8 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         seed = settings.get("seed")
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
-        key = str(settings["scenario"]), _scenario_digest(folder), _column(settings)
+        column = ", ".join([_column(settings), *_granted(run.result)])
+        key = str(settings["scenario"]), _scenario_digest(folder), column
         grouped.setdefault(key, []).append((settings, run))
     conditions = []
     for (scenario, digest, column), members in grouped.items():
@@ -199,6 +200,17 @@ def _scenario_digest(folder: Path) -> str:
 def _column(settings: Mapping[str, Any]) -> str:
     """Who played, and what of it is not the default."""
     return ", ".join([str(settings.get("agent", "ppo")), *unusual(settings)])
+
+
+def _granted(result: ResultRecord | None) -> Iterator[str]:
+    """What was granted to a player, which makes another condition; a person's session is as long as it is."""
+    if result is not None:
+        if result.tell != "nothing":
+            yield f"told {'a goal' if result.tell == 'goal' else result.tell}"
+        if result.view != "seat":
+            yield f"sees the {result.view}"
+        if result.trials > 1 and result.kind != "person":
+            yield f"{result.trials} trials"
 
 
 def unusual(settings: Mapping[str, Any]) -> list[str]:

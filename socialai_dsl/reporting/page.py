@@ -11,6 +11,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
@@ -213,6 +214,8 @@ def _section(anchor: str, section: Section, drawings: Mapping[str, bytes]) -> di
         "tests": sum(one["p"] is not None for one in section.comparisons),
         "comparisons": [_comparison(one) for one in section.comparisons],
         "rooms": [_pairing(one) for one in section.rooms],
+        "players": _players(section),
+        "trials": [row for summary in section.summaries for row in _trials(summary)],
         "models": [row for summary in section.summaries for row in _replies(summary)],
         "iqm": _iqm(section),
         "curves": [(name, panel) for name, panel in drawn if name in drawings],
@@ -292,6 +295,39 @@ def _pairing(one: Mapping[str, Any]) -> dict[str, str]:
         **counts,
         "difference": _interval(difference, "+.3f"),
     }
+
+
+def _players(section: Section) -> Rows:
+    """What kind of mind plays in each condition, and what it was granted; nothing where trained agents alone play."""
+    rows, kinds = [], set[str]()
+    for summary in section.summaries:
+        for result in [run.result for run in summary.condition.done if run.result is not None][:1]:
+            kinds.add(result.kind or "network")
+            rows.append(
+                {
+                    "condition": summary.name,
+                    "kind of mind": result.kind or _NONE,
+                    "told": "\n".join(filter(None, (result.tell, result.told))),
+                    "saw": "the room" if result.view == "room" else "its seat's view",
+                    "remembers": "one episode" if result.trials == 1 else f"{result.trials} episodes",
+                }
+            )
+    return rows if kinds - {"network"} else []
+
+
+def _trials(summary: Summary) -> Iterator[dict[str, str]]:
+    """Success by trial, over all sessions and seeds."""
+    found = [run.figures.trials for run in summary.condition.done if run.figures is not None]
+    for number, trials in enumerate(zip_longest(*found), 1):
+        played = [trial for trial in trials if trial is not None]
+        episodes = sum(trial.episodes for trial in played)
+        successes = sum(trial.success_rate * trial.episodes for trial in played)
+        yield {
+            "condition": summary.name,
+            "trial": str(number),
+            "episodes": f"{episodes:,}",
+            "success": f"{successes / episodes:.3f}",
+        }
 
 
 def _replies(summary: Summary) -> Iterator[dict[str, str]]:

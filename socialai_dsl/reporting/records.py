@@ -29,10 +29,18 @@ class ProbeFigures(Record):
     chance: float | None = Field(None, ge=0, le=1)
 
 
+class TrialFigures(Record):
+    """What came of the episodes that were the same trial of their sessions."""
+
+    episodes: int = Field(ge=1)
+    success_rate: float = Field(ge=0, le=1)
+
+
 class Figures(Record):
     """What came of the test episodes: the object `eval` of a result.
 
     Attributes:
+        trials: in order, where players remembered several episodes in a row.
         replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
             `cost` in US dollars, None where prices are not known.
     """
@@ -51,11 +59,23 @@ class Figures(Record):
     tokens_estimated: bool = False
     cost: float | None = Field(None, ge=0)
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
+    trials: list[TrialFigures] = Field(default_factory=list)
 
 
 class ResultRecord(Record):
-    """`result.json`."""
+    """`result.json`, in one form for all players.
 
+    Attributes:
+        kind: of mind: network, script, chance, model, person or policy; empty where an older version wrote it.
+        tell, told: what the player was told of the task. view: what it saw.
+        trials: how many episodes in a row it remembered.
+    """
+
+    kind: str = ""
+    tell: str = "nothing"
+    told: str = ""
+    view: str = "seat"
+    trials: int = Field(1, ge=1)
     frames: int = 0
     train_seconds: float = 0.0
     frames_per_second: float | None = None

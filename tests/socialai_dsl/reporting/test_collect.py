@@ -145,3 +145,22 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
     assert columns == ["ppo", "ppo, lr=0.1", "ppo"]
     with pytest.raises(ValueError, match=r"expected the folder of a run, with its config\.json"):
         read_runs([tmp_path])
+
+
+@pytest.mark.parametrize(
+    ("granted", "column"),
+    [
+        ({"tell": "instructions", "told": "Find the exit."}, "ppo, told instructions"),
+        ({"tell": "goal"}, "ppo, told a goal"),
+        ({"view": "room"}, "ppo, sees the room"),
+        ({"trials": 3}, "ppo, 3 trials"),
+        ({"trials": 3, "kind": "person"}, "ppo"),
+    ],
+)
+def test_what_a_player_is_granted_makes_another_condition(
+    tmp_path: Path, granted: dict[str, object], column: str
+) -> None:
+    folders = [write_run(tmp_path / name, "help", 0, 0.5) for name in ("a", "b")]
+    result = json.loads((tmp_path / "b" / "result.json").read_text())
+    (tmp_path / "b" / "result.json").write_text(json.dumps(result | granted))
+    assert {c.entry.column for c in read_runs(folders).conditions} == {"ppo", column}

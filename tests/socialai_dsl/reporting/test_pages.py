@@ -201,5 +201,29 @@ def test_probes_stand_beside_success(tmp_path: Path) -> None:
     assert ["Sally / model", "never", "0", "–", "–", "0.500"] in rows
 
 
+def test_the_page_tells_who_played_and_what_was_learnt_within_a_session(tmp_path: Path) -> None:
+    write_experiment(tmp_path, [condition("Asked / model", [0.25, 0.75])])
+    for seed, first in ((0, 0.0), (1, 1.0)):
+        path = tmp_path / "runs" / f"c0-s{seed}" / "result.json"
+        result = json.loads(path.read_text(encoding="utf-8"))
+        result |= {"kind": "model", "tell": "goal", "told": "Find out.", "trials": 2}
+        trials = [{"episodes": 10, "success_rate": rate} for rate in (first, 0.6)]
+        result["eval"]["trials"] = trials[: 2 - seed]
+        path.write_text(json.dumps(result), encoding="utf-8")
+    page = read(tmp_path)
+    (players,) = [row for row in page.table("kind of mind") if row[0] == "Asked / model"]
+    assert (players[1], players[3], players[4]) == ("model", "its seat's view", "2 episodes")
+    assert "goal" in players[2]
+    assert "Find out." in players[2]
+    rows = page.table("trial")
+    assert ["Asked / model", "1", "20", "0.500"] in rows
+    assert ["Asked / model", "2", "10", "0.600"] in rows
+
+
+def test_where_trained_agents_alone_play_nothing_is_said_of_minds(page: Page) -> None:
+    assert "kind of mind" not in page.text
+    assert "By trial" not in page.text
+
+
 def test_an_agent_that_was_asked_nothing_has_no_table_of_probes(page: Page) -> None:
     assert "Probes" not in page.text
