@@ -214,7 +214,7 @@ def test_the_page_tells_who_played_and_what_was_learnt_within_a_session(tmp_path
     (players,) = [row for row in page.table("kind of mind") if row[0] == "Asked / model"]
     assert (players[1], players[3], players[4]) == ("model", "its seat's view", "2 episodes")
     assert "goal" in players[2]
-    assert "Find out." in players[2]
+    assert "Find out." in page.text
     rows = page.table("trial")
     assert ["Asked / model", "1", "20", "0.500"] in rows
     assert ["Asked / model", "2", "10", "0.600"] in rows
