@@ -203,6 +203,24 @@ def test_the_trainer_sees_only_the_facade(path: Path) -> None:
             assert name in FACADE, f"{path.relative_to(ROOT)}:{line}: the trainer must not import {name}"
 
 
+def test_environments_are_played_in_rooms_alone() -> None:
+    """Whoever plays, plays in `episodes.Rooms`; the trainer collects, and what lies below looks into the engine."""
+    above = ("episodes", "evaluation", "llm", "play", "runs", "studio", "cli", "traces")
+    found = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for package in above
+        for path in modules(f"socialai_dsl/{package}")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == "step"
+        and ast.unparse(node.func.value).rpartition(".")[2].strip("_") in ("env", "envs")
+    ]
+    own = {path.relative_to(ROOT).as_posix() for path in modules("socialai_dsl/episodes")}
+    assert [place for place in found if place.partition(":")[0] not in own] == []
+    assert found, "Rooms is found"
+
+
 def graph(*packages: str) -> dict[str, set[str]]:
     """Module -> the modules of these packages that it imports anywhere: in functions and for typing as well."""
     paths = {name_of(path): path for package in packages for path in modules(package)}

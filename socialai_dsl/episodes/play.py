@@ -289,7 +289,11 @@ class OneEpisode:
 
 
 def play(
-    rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, stop: Callable[[], bool] = lambda: False
+    rooms: Rooms,
+    players: Mapping[Seat, Policy],
+    agenda: Agenda,
+    stop: Callable[[], bool] = lambda: False,
+    wait: float | None = None,
 ) -> None:
     """Play the episodes of an agenda. A room whose episode has ended plays the next one that is left.
 
@@ -298,12 +302,13 @@ def play(
         players: a policy for each seat.
         agenda: which episodes.
         stop: asked before each step whether to stop there.
+        wait: seconds that a policy which answers later may take for an answer; None: for ever.
 
     Raises:
-        ValueError: a seat has no policy, or a policy's actions are not the scenario's; or there are more rooms than
-            episodes. What a policy raises says in a note where it was.
+        ValueError: a seat has no policy, or a policy's actions are not the scenario's, or it does not answer in time; or
+            there are more rooms than episodes. What a policy raises says in a note where it was.
     """
-    playing = play_async(rooms, players, agenda, stop)
+    playing = play_async(rooms, players, agenda, stop, wait)
     if any(inspect.iscoroutinefunction(getattr(policy, "act", None)) for policy in players.values()):
         asyncio.run(playing)
         return
@@ -316,7 +321,11 @@ def play(
 
 
 async def play_async(
-    rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, stop: Callable[[], bool] = lambda: False
+    rooms: Rooms,
+    players: Mapping[Seat, Policy],
+    agenda: Agenda,
+    stop: Callable[[], bool] = lambda: False,
+    wait: float | None = None,
 ) -> None:
     """`play`, with policies that answer later."""
     if set(players) != set(rooms.seats):
@@ -328,7 +337,7 @@ async def play_async(
         if not rooms.running.any() or stop():
             return
         try:
-            actions = {seat: await _asked(rooms, seat, policy) for seat, policy in players.items()}
+            actions = {seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items()}
         except PolicyDone:
             return
         ended = rooms.step(actions).ended
@@ -354,13 +363,15 @@ def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: 
             policy.reset(forgetting.copy(), numbers.copy())
 
 
-async def _asked(rooms: Rooms, seat: Seat, policy: Policy) -> Int64:
+async def _asked(rooms: Rooms, seat: Seat, policy: Policy, wait: float | None) -> Int64:
     """The actions that a policy chooses."""
     try:
         actions = policy.act(rooms.observations[seat])
-        return await actions if inspect.isawaitable(actions) else actions
+        return await asyncio.wait_for(actions, wait) if inspect.isawaitable(actions) else actions
     except PolicyDone:
         raise
+    except TimeoutError:
+        raise ValueError(f"{seat}: {type(policy).__name__} did not answer within {wait} s") from None
     except Exception as error:
         going = rooms.numbers[rooms.running].tolist()
         shown = (

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.episodes.play import Bools, Int64, Rooms, Seat, Step
+from socialai_dsl.episodes.play import AGENT, Bools, Int64, Rooms, Seat, Step
 from socialai_dsl.episodes.policies import Observation
 
 
@@ -65,6 +65,12 @@ class Stage(Rooms):
         for observer in self.observers:
             observer.back(self)
         return True
+
+    def rehearse(self, actions: Mapping[Seat, Int64], look: Callable[[], Any]) -> None:
+        """Play a step that nobody sees, `look` at what came of it, and take it back; it prepares the first one."""
+        self.env.step(actions[AGENT][0])
+        look()
+        self.env.restore(self.moments[-1].snapshot)
 
     @property
     def steps(self) -> int:

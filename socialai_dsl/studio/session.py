@@ -124,9 +124,7 @@ class Session:
         stage, _ = self._playing()
         if not self._prepared and stage.running.all() and stage.steps == 0:
             self._prepared = True
-            stage.env.step(stage.env.encode_action((None, None)))  # past the stage: nobody is to see it
-            stage.env.explain()
-            stage.env.restore(stage.moments[0].snapshot)
+            stage.rehearse({AGENT: stage.env.encode_action((None, None))[None]}, stage.env.explain)
 
     def auto(self) -> Reply:
         """Let the chosen player play a step."""

@@ -100,6 +100,15 @@ def test_a_policy_may_answer_later() -> None:
     assert log.steps == 40
 
 
+def test_a_policy_that_does_not_answer_is_not_waited_for() -> None:
+    class Silent(Still):
+        async def act(self, observation: Any) -> Any:
+            await asyncio.Event().wait()
+
+    with pytest.raises(ValueError, match=r"agent: Silent did not answer within 0\.05 s"):
+        play(Rooms(envs(1)), {AGENT: Silent()}, TestEpisodes(1), wait=0.05)
+
+
 def test_play_stops_where_a_policy_has_nothing_more_to_do() -> None:
     env: Any = sd.make("dance")
     rooms = Rooms(env, [log := Log(), kept := Actions()])
