@@ -305,8 +305,8 @@ def play(
         wait: seconds that a policy which answers later may take for an answer; None: for ever.
 
     Raises:
-        ValueError: a seat has no policy, or a policy's actions are not the scenario's, or it does not answer in time; or
-            there are more rooms than episodes. What a policy raises says in a note where it was.
+        ValueError: a seat has no policy, or a policy's actions are not the scenario's, or it does not answer in time;
+            or there are more rooms than episodes. What a policy raises says in a note where it was.
     """
     playing = play_async(rooms, players, agenda, stop, wait)
     if any(inspect.iscoroutinefunction(getattr(policy, "act", None)) for policy in players.values()):
