@@ -19,8 +19,6 @@ from socialai_dsl.runs.folder import METRICS, OPTIONS
 # A few updates of either kind of network: 8,192 frames each for `fast`, 640 for the paper's presets.
 _FRAMES: Final = {"paper-reference": 2_560, "paper-reference-tuned": 2_560}
 _USUAL_FRAMES: Final = 24_576
-_MEASURED: Final = ("net", "envs", "threads", "device", "precision", "hyper")
-"""Options of which the speed depends."""
 
 
 def measure_unknown(runs: Sequence[PlannedRun], speeds: Speeds, say: Callable[[str], None]) -> None:
@@ -48,11 +46,8 @@ def measure_unknown(runs: Sequence[PlannedRun], speeds: Speeds, say: Callable[[s
 
 def _measured(run: PlannedRun) -> float:
     """Frames per second after the first update, in which code is compiled and memory is found."""
-    condition = run.condition
-    asked = {name: value for name, value in condition["options"].items() if name in _MEASURED}
-    asked |= asked.pop("hyper", {})
-    asked |= {"scenario": condition["scenario"], "eval_episodes": 1}
-    asked["frames"] = _FRAMES.get(str(asked["net"]), _USUAL_FRAMES)
+    asked = run.options
+    asked |= {"frames": _FRAMES.get(str(asked["net"]), _USUAL_FRAMES), "eval_episodes": 1, "wandb": None}
     with tempfile.TemporaryDirectory() as place:
         file, folder = Path(place, OPTIONS), Path(place, "run")
         write_json(file, asked)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.experiments import LoadedExperiment
@@ -16,7 +16,7 @@ from socialai_dsl.frontend import load_experiment
 from socialai_dsl.loader.reader import shipped_experiments
 from socialai_dsl.loader.resolved import looks_like_path
 
-_CHANGES_SHOWN = 10
+_CHANGES_SHOWN: Final = 10
 
 
 def requested(name: str, profile: str | None, out: Path | None) -> tuple[dict[str, Any], Path]:
