@@ -317,7 +317,7 @@ def test_talkitout_is_played_stepped_back_and_ends_elsewhere(studio: Page, tmp_p
 
 def test_as_the_agent_sees_it_there_is_no_room(studio: Page) -> None:
     begin(studio, SEED)
-    studio.get_by_label("as the agent sees it").check()
+    studio.get_by_role("checkbox", name="as the agent sees it").check()
     beside = Episode("talkitout")
     seen = studio.locator(".seat pre")
     assert (
@@ -332,7 +332,7 @@ def test_as_the_agent_sees_it_there_is_no_room(studio: Page) -> None:
     studio.keyboard.press("x")
     studio.locator(".message.bad", has_text="✗ no success").wait_for()
     assert studio.locator(".controls output").inner_text() == "step 1"
-    studio.get_by_label("as the agent sees it").uncheck()
+    studio.get_by_role("checkbox", name="as the agent sees it").uncheck()
     studio.locator(".message.bad", has_text="✗ failure").wait_for()
     assert studio.locator(".stage").is_visible()
 
