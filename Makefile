@@ -15,7 +15,7 @@ SECONDS_EACH ?= 60
 # The tests start hundreds of processes, each of which would compile all of our modules.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference update-goldens clean
+.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference replication update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -99,6 +99,9 @@ sheets: $(STAMP) ## write the data sheets of the shipped scenarios, docs/scenari
 
 reference: $(STAMP) ## write every key and word of the language, docs/reference.md
 	$(BIN)/python -m tools.reference --out docs/reference.md
+
+replication: $(STAMP) ## write the tables of docs/replication.md from the runs that are kept beside it
+	$(BIN)/python -m tools.replication --out docs/replication.md
 
 docs: $(STAMP) ## build the pages of docs/ as a site, in build/site
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'

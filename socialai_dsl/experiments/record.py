@@ -22,11 +22,15 @@ class Reference(Record):
 
     Attributes:
         mean: success rate, 0 to 1. std: its standard deviation over seeds; None where it was not published.
+        n: the number of seeds; None where it was not published.
+        deviation: what `std` divides by, n - 1 (`sample`) or n (`population`).
         note: what is to be known about it. source: where it was published.
     """
 
     mean: float = Field(ge=0, le=1)
     std: float | None = Field(None, ge=0)
+    n: int | None = Field(None, ge=2)
+    deviation: Literal["sample", "population"] = "sample"
     note: Words = ""
     source: Words = ""
 

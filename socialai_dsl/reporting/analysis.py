@@ -12,6 +12,7 @@ import pandas as pd
 
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, RunRecord
+from socialai_dsl.reporting.published import Figure, against_published
 from socialai_dsl.reporting.records import EndingRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
@@ -80,6 +81,14 @@ class Summary:
         curves = self.seeds.success if self.seeds is not None else ()
         return pd.Series([area_under(curve) for curve in curves], dtype=float).dropna()
 
+    @property
+    def figures(self) -> list[Figure]:
+        """Each published figure of the condition and of its tests, with ours."""
+        entry = self.condition.entry
+        own = [] if entry.reference is None else [("", self.success, entry.reference)]
+        further = [(test, self.tests.get(test, ()), told) for test, told in entry.test_references.items()]
+        return [Figure(entry.group, self.name, test, list(ours), told) for test, ours, told in own + further]
+
     def reached(self, threshold: float) -> list[float | None]:
         """The frames after which each seed's curve had reached so much; None where it never did."""
         if self.seeds is None:
@@ -95,6 +104,7 @@ class Section:
         group: as the experiment calls it. summaries: in order.
         comparisons: of the columns of each row; in a case study also of the rows of each column. p_bonferroni is
             corrected for all of them.
+        published: of each published figure how ours compares with it. p_bonferroni is corrected for all of them.
         rooms: those of the pairs that played the same test episodes, as far as runs list them.
         columns: of a table, interquartile mean of each column, over its rows and over those that all columns have.
         common_rows: in how many rows every column has results.
@@ -103,6 +113,7 @@ class Section:
     group: str | None
     summaries: Sequence[Summary]
     comparisons: Sequence[dict[str, Any]] = ()
+    published: Sequence[dict[str, Any]] = ()
     rooms: Sequence[dict[str, Any]] = ()
     columns: Sequence[dict[str, Any]] = ()
     common_rows: int = 0
@@ -231,9 +242,10 @@ def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
     comparisons = [_comparison(*pair) for pair in section.pairs() if all(len(one.success) for one in pair)]
     for one, p in zip(comparisons, bonferroni([one["p"] for one in comparisons]), strict=True):
         one["p_bonferroni"] = p
+    published = against_published([figure for summary in summaries for figure in summary.figures])
     rooms = [row for pair in section.pairs() if (row := pair_by_room(*pair)) is not None]
     columns, common = _columns(section) if section.is_table else ([], 0)
-    return Section(group, summaries, comparisons, rooms, columns, common)
+    return Section(group, summaries, comparisons, published, rooms, columns, common)
 
 
 def _comparison(first: Summary, second: Summary) -> dict[str, Any]:
@@ -295,11 +307,12 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
 
 
 def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
-    """Name of a table -> the table: runs, conditions, comparisons, rooms and outcomes."""
+    """Name of a table -> the table: runs, conditions, published, comparisons, rooms and outcomes."""
     conditions, sections = analysis.experiment.conditions, analysis.sections
     rows = {
         "runs": [_run(condition, run) for condition in conditions for run in condition.runs],
         "conditions": [_condition(summary) for summary in analysis.summaries],
+        "published": [one for section in sections for one in section.published],
         "comparisons": [one for section in sections for one in section.comparisons],
         "rooms": [one for section in sections for one in section.rooms],
         "outcomes": [row for condition in conditions for row in _outcomes(condition)],
@@ -351,6 +364,7 @@ def _condition(summary: Summary) -> dict[str, Any]:
         "success_high": high,
         "published_mean": reference.mean if reference else None,
         "published_std": reference.std if reference else None,
+        "published_n": reference.n if reference else None,
         "published_source": reference.source if reference else None,
         "area_mean": summary.areas.mean() if len(summary.areas) else None,
         **{

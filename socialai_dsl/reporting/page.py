@@ -21,7 +21,6 @@ import pandas as pd
 from markupsafe import Markup
 
 from socialai_dsl.baselines import Baselines, Level
-from socialai_dsl.experiments.record import Reference
 from socialai_dsl.reporting.analysis import (
     RISING,
     SOLVED,
@@ -31,6 +30,7 @@ from socialai_dsl.reporting.analysis import (
     Summary,
 )
 from socialai_dsl.reporting.collect import RunRecord
+from socialai_dsl.reporting.published import MARGIN
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
@@ -86,6 +86,7 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         ],
         interval=_interval_example(analysis),
         alpha=ALPHA,
+        margin=f"{MARGIN:.2f}",
         resamples=f"{RESAMPLES:,}",
         rising=RISING,
         solved=SOLVED,
@@ -100,14 +101,32 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
 def spread(values: Sequence[float] | pd.Series) -> str:
     """Mean ± standard deviation; the mean alone of one seed; a dash without any."""
     known = pd.Series(values, dtype=float)
-    if known.empty:
+    return figure(known.mean(), known.std()) if len(known) else _NONE
+
+
+def figure(mean: float | None, std: float | None, digits: int = 3) -> str:
+    """Mean ± standard deviation; the mean alone where its deviation is unknown; a dash without any."""
+    if mean is None:
         return _NONE
-    return f"{known.mean():.3f}" + (f" ± {known.std():.3f}" if len(known) > 1 else "")
+    known = std is not None and not math.isnan(std)
+    return f"{mean:.{digits}f}" + (f" ± {std:.{digits}f}" if known else "")
+
+
+def difference(one: Mapping[str, Any]) -> str:
+    """A difference, with its interval where there is one."""
+    if one["difference_low"] is None:
+        return signed(one["difference"])
+    return _interval(Estimate(*(one[f"difference{part}"] for part in ("", "_low", "_high"))), "+.3f")
 
 
 def signed(value: float | None, form: str = "+.3f") -> str:
     """A number with a real minus sign, or a dash where there is none."""
     return _NONE if value is None or math.isnan(value) else format(value, form).replace("-", "\u2212")
+
+
+def p_value(value: float | None) -> str:
+    """A p, which is never 0; a dash without one."""
+    return "< 0.0001" if value is not None and value < 1e-4 else signed(value, ".4f")
 
 
 def count_of(number: int, noun: str) -> str:
@@ -143,13 +162,12 @@ def _lead(analysis: Analysis) -> str:
         f"{finished} of {len(runs)} runs done{others}, in {count_of(len(summaries), 'condition')}; "
         f"{frames:,} frames trained in {_duration(seconds)} of run time."
     ]
-    referred = [(s.success, s.condition.entry.reference) for s in summaries if len(s.success)]
-    close = [_agrees(success, reference) for success, reference in referred if reference is not None]
-    if close:
-        parts.append(
-            f"Of {count_of(len(close), 'condition')} with a published figure, {sum(close)} have it within one "
-            "published standard deviation of the mean, or within 0.05 where none was published."
-        )
+    verdicts = Counter(
+        one["verdict"].partition(":")[0] for section in analysis.sections for one in section.published
+    )
+    if verdicts:
+        listed = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        parts.append(f"Beside {count_of(verdicts.total(), 'published figure')}: {listed}.")
     tested = [c["p_bonferroni"] for s in analysis.sections for c in s.comparisons if c["p"] is not None]
     if tested:
         found = sum(p < ALPHA for p in tested)
@@ -161,10 +179,6 @@ def _lead(analysis: Analysis) -> str:
     if short:
         parts.append(f"{count_of(short, 'condition')} {'is' if short == 1 else 'are'} too short to judge.")
     return " ".join(parts)
-
-
-def _agrees(success: pd.Series, reference: Reference) -> bool:
-    return bool(abs(success.mean() - reference.mean) <= (0.05 if reference.std is None else reference.std))
 
 
 def _state_of(run: RunRecord) -> str:
@@ -209,7 +223,8 @@ def _section(anchor: str, section: Section, drawings: Mapping[str, bytes]) -> di
         "title": title,
         "columns": columns,
         "grid": grid,
-        "published": [row for summary in section.summaries for row in _published(summary)],
+        "published": [_published(one) for one in section.published],
+        "published_tests": sum(one["p"] is not None for one in section.published),
         "probes": [row for summary in section.summaries for row in _probes(summary)],
         "tests": sum(one["p"] is not None for one in section.comparisons),
         "comparisons": [_comparison(one) for one in section.comparisons],
@@ -234,17 +249,20 @@ def _section(anchor: str, section: Section, drawings: Mapping[str, bytes]) -> di
     }
 
 
-def _published(summary: Summary) -> Iterator[dict[str, Any]]:
-    entry = summary.condition.entry
-    for test, reference in [("", entry.reference), *entry.test_references.items()]:
-        if reference is not None:
-            yield {
-                "condition": f"{summary.name} on {test}" if test else summary.name,
-                "mean": f"{reference.mean:.3f}",
-                "standard deviation": signed(reference.std, ".3f"),
-                "source": reference.source,
-                "note": reference.note,
-            }
+def _published(one: Mapping[str, Any]) -> dict[str, str]:
+    test = f" on {scenario_name(one['test'])}" if one["test"] else ""
+    of = f"\nover {count_of(one['published_n'], 'seed')}" if one["published_n"] else ""
+    said = "\n".join(filter(None, (one["source"], one["note"])))
+    return {
+        "condition": one["condition"] + test,
+        "ours": figure(one["success_mean"], one["success_std"]) + f"\nover {count_of(one['seeds'], 'seed')}",
+        "published": figure(one["published_mean"], one["published_std"], 2) + of,
+        "difference": difference(one),
+        "p": p_value(one["p"]),
+        "p corrected": p_value(one["p_bonferroni"]),
+        "verdict": one["verdict"],
+        "source": said,
+    }
 
 
 def _probes(summary: Summary) -> Iterator[dict[str, Any]]:
@@ -275,25 +293,20 @@ def _comparison(one: Mapping[str, Any]) -> dict[str, str]:
         "difference": signed(one["difference"]),
         "t": signed(one["welch_t"], "+.2f"),
         "df": signed(one["degrees_of_freedom"], ".1f"),
-        "p": _p(one["p"]),
-        "p corrected": _p(adjusted),
+        "p": p_value(one["p"]),
+        "p corrected": p_value(adjusted),
         "Hedges' g": signed(one["hedges_g"], "+.2f"),
         "verdict": "not testable" if adjusted is None else found,
     }
 
 
-def _p(value: float | None) -> str:
-    return "< 0.0001" if value is not None and value < 1e-4 else signed(value, ".4f")
-
-
 def _pairing(one: Mapping[str, Any]) -> dict[str, str]:
-    difference = Estimate(one["difference"], one["difference_low"], one["difference_high"])
     counts = {name.replace("_", " "): f"{one[name]:,}" for name in ("rooms", "first_better", "second_better")}
     return {
         "first": one["first"],
         "second": one["second"],
         **counts,
-        "difference": _interval(difference, "+.3f"),
+        "difference": difference(one),
     }
 
 

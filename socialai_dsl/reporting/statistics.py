@@ -8,7 +8,6 @@ with intervals of a stratified bootstrap.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -32,20 +31,47 @@ class Estimate(NamedTuple):
     high: float
 
 
+class Sample(NamedTuple):
+    """What Welch's test needs to know of a group of seeds.
+
+    Attributes:
+        mean: of their figures.
+        std: their sample standard deviation, which divides by n - 1; None where it is unknown, as for one seed.
+        n: how many; None where it is unknown.
+    """
+
+    mean: float
+    std: float | None
+    n: int | None
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> Sample:
+        """The sample that these values are, at least one."""
+        if len(values) < 2:
+            return cls(float(np.mean(values)), None, len(values))
+        alike = len(set(values)) == 1  # of which NumPy's deviation need not be 0
+        return cls(float(np.mean(values)), 0.0 if alike else float(np.std(values, ddof=1)), len(values))
+
+
 class Test(NamedTuple):
     """A comparison of two groups of seeds.
 
+    All but `difference` are None where the test says nothing: a group of fewer than two or of unknown spread, or no
+    spread in either.
+
     Attributes:
         difference: of the means, first minus second.
-        t, degrees, p: Welch's statistic, its degrees of freedom, the two-sided p. None where the test says nothing:
-            a group of fewer than two, or no spread in either.
-        g: Hedges' g; None where the pooled standard deviation is 0 or unknown.
+        t, degrees, p: Welch's statistic, its degrees of freedom, the two-sided p.
+        low, high: the interval of the difference, `LEVEL` of it.
+        g: Hedges' g.
     """
 
     difference: float
     t: float | None = None
     degrees: float | None = None
     p: float | None = None
+    low: float | None = None
+    high: float | None = None
     g: float | None = None
 
 
@@ -57,33 +83,35 @@ def compare(first: Sequence[float], second: Sequence[float]) -> Test:
     """
     if not len(first) or not len(second):
         raise ValueError(f"got groups of {len(first)} and {len(second)}, expected at least one value in each")
-    difference = float(np.mean(first) - np.mean(second))
-    if min(len(first), len(second)) < 2 or len(set(first)) == len(set(second)) == 1:
+    return welch(Sample.of(first), Sample.of(second))
+
+
+def welch(first: Sample, second: Sample) -> Test:
+    """Welch's t-test and Hedges' g of two groups of which mean, deviation and size are known."""
+    difference = first.mean - second.mean
+    spreads = [(one.std, one.n) for one in (first, second) if one.std is not None and one.n is not None]
+    errors = [std**2 / n for std, n in spreads]
+    variance = sum(errors)
+    if len(spreads) < 2 or not variance:
         return Test(difference)
-    with warnings.catch_warnings():
-        # One group may be all alike, as where every seed solves everything; the other's variance then decides.
-        warnings.filterwarnings("ignore", message="Precision loss occurred")
-        test = stats.ttest_ind(first, second, equal_var=False)
-    return Test(
-        difference, float(test.statistic), float(test.df), float(test.pvalue), hedges_g(first, second)
-    )
+    shares = [(error / variance, n - 1) for error, (_, n) in zip(errors, spreads, strict=True)]
+    degrees = 1 / sum(share**2 / freedom for share, freedom in shares)
+    t = difference / math.sqrt(variance)
+    p = 2 * float(stats.t.sf(abs(t), degrees))
+    half = float(stats.t.ppf((1 + LEVEL) / 2, degrees)) * math.sqrt(variance)
+    g = _hedges_g(difference, spreads)
+    return Test(difference, t, degrees, p, difference - half, difference + half, g)
 
 
-def hedges_g(first: Sequence[float], second: Sequence[float]) -> float | None:
+def _hedges_g(difference: float, spreads: Sequence[tuple[float, int]]) -> float:
     """Difference of the means in pooled standard deviations, times the factor that makes it unbiased (Hedges 1981).
 
-    The factor is J(m) = Γ(m/2) / (√(m/2) Γ((m-1)/2)), with m = n1 + n2 - 2 degrees of freedom. None where the pooled
-    standard deviation is 0 or a group has fewer than two values.
+    The factor is J(m) = Γ(m/2) / (√(m/2) Γ((m-1)/2)), with m = n1 + n2 - 2 degrees of freedom.
     """
-    degrees = len(first) + len(second) - 2
-    if min(len(first), len(second)) < 2:
-        return None
-    squares = (len(first) - 1) * np.var(first, ddof=1) + (len(second) - 1) * np.var(second, ddof=1)
-    pooled = math.sqrt(squares / degrees)
-    if pooled == 0.0:
-        return None
+    degrees = sum(n - 1 for _, n in spreads)
+    pooled = math.sqrt(sum((n - 1) * std**2 for std, n in spreads) / degrees)
     factor = math.exp(gammaln(degrees / 2) - gammaln((degrees - 1) / 2)) / math.sqrt(degrees / 2)
-    return float((np.mean(first) - np.mean(second)) / pooled * factor)
+    return float(difference / pooled * factor)
 
 
 def bonferroni(ps: Sequence[float | None]) -> list[float | None]:

@@ -36,10 +36,14 @@ AGENTS: Final = ("ppo", "random", "oracle")
 
 
 class Reference(Model):
-    """A published figure of this condition, which the report sets beside ours."""
+    """A published figure, which the report sets beside ours and compares with it; `std` requires `n`."""
 
     mean: float | int = Field(description="share of successful test episodes, mean over seeds", ge=0, le=1)
     std: float | int | None = Field(None, description="its standard deviation over seeds", ge=0, le=1)
+    n: int | None = Field(None, description="the number of seeds", ge=2, le=10_000)
+    deviation: Literal["sample", "population"] = Field(
+        "sample", description="whether `std` divides by n − 1 (sample, the default) or by n (population)"
+    )
     note: Prose | None = Field(None, description="a remark for the comparison")
     source: str | None = Field(None, description="the source of the figure")
 

@@ -297,6 +297,9 @@ class _Expansion:
             )
             self._bag.error("S105", message, self._places.key_span(draft.place))
         seeds = self._seeds(given.get("seeds", 1), places.get("seeds", ()))
+        self._check_reference(given.get("reference"), places.get("reference", ()))
+        for number, (_, reference) in enumerate(map(_tested, given.get("tests", ()))):
+            self._check_reference(reference, (*places["tests"], number, "reference"))
         return Cell(
             draft.name,
             draft.group,
@@ -324,6 +327,11 @@ class _Expansion:
                 span = self._places.value_span((*place, number))
                 self._bag.error("S702", f"the seed {seed} is given twice", span)
         return tuple(dict.fromkeys(seeds))
+
+    def _check_reference(self, reference: Reference | None, place: DataPath) -> None:
+        if reference is not None and reference.std is not None and reference.n is None:
+            message = "a `reference` with `std` needs a key `n`: over how many seeds it was measured"
+            self._bag.error("S105", message, self._places.key_span((*place, "std")))
 
     def _check_names(self, drafts: Sequence[_Draft]) -> None:
         seen: dict[str, DataPath] = {}

@@ -98,9 +98,7 @@ def test_the_weights_of_a_checkpoint_count(tmp_path):
 
 
 def test_what_a_condition_says(tmp_path):
-    text = (
-        ", bonus: auto, tests: [{scenario: help, reference: {mean: 0.3}}], reference: {mean: 0.5, std: 0.1}"
-    )
+    text = ", bonus: auto, tests: [{scenario: help, reference: {mean: 0.3}}], reference: {mean: 0.5, std: 0.1, n: 3}"
     (condition,) = document(tmp_path, text)["conditions"]
     assert condition == {
         "name": "one",
@@ -122,8 +120,10 @@ def test_what_a_condition_says(tmp_path):
             "hyper": {"bonus_c": 3.0},
         },
         "tests": ["help"],
-        "reference": {"mean": 0.5, "std": 0.1, "note": None, "source": None},
-        "test_references": {"help": {"mean": 0.3, "std": None, "note": None, "source": None}},
+        "reference": {"mean": 0.5, "std": 0.1, "n": 3, "deviation": "sample", "note": None, "source": None},
+        "test_references": {
+            "help": {"mean": 0.3, "std": None, "n": None, "deviation": "sample", "note": None, "source": None}
+        },
     }
     (chance,) = document(tmp_path, ", agent: random")["conditions"]
     assert (chance["frames"], chance["options"]) == (None, {"device": "cpu", "eval_episodes": 500})

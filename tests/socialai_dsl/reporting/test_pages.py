@@ -18,7 +18,7 @@ from tests.socialai_dsl.reporting.page_reader import Page
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_tests
 
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>|`$x_1$` [a](javascript:b)\n\u202e_"
-PUBLISHED = {"mean": 0.45, "std": 0.05, "note": "30 M frames", "source": "paper, Table 2"}
+PUBLISHED = {"mean": 0.45, "std": 0.05, "n": 16, "note": "30 M frames", "source": "paper, Table 2"}
 
 
 def drawn(analysis: Analysis) -> dict[str, bytes]:
@@ -62,10 +62,7 @@ def page(analysis: Analysis, drawings: dict[str, bytes]) -> Page:
 
 def test_the_page_begins_with_what_there_is(page: Page) -> None:
     assert "7 of 7 runs done, in 3 conditions; 7,000 frames trained in 10 min of run time." in page.text
-    assert (
-        "Of 1 condition with a published figure, 1 have it within one published standard deviation"
-        in page.text
-    )
+    assert "Beside 2 published figures: 1 not shown to differ, 1 not testable." in page.text
 
 
 @pytest.mark.parametrize("said", [
@@ -149,7 +146,7 @@ def test_tables_for_other_programs(analysis: Analysis) -> None:
         for name, table in tables(analysis).items()
     }
     assert {name: len(rows) for name, rows in found.items()} == {
-        "runs": 7, "conditions": 3, "comparisons": 1, "rooms": 0, "outcomes": 21,
+        "runs": 7, "conditions": 3, "published": 2, "comparisons": 1, "rooms": 0, "outcomes": 21,
     }  # fmt: skip
     first = found["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)
