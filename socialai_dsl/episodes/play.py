@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.episodes.policies import Observation, Policy, PolicyDone
+from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
 from socialai_dsl.program_suite import outcome_name
 
 Bools = NDArray[np.bool_]
@@ -140,6 +140,16 @@ class Rooms:
             observer.stepped(self, step)
         return step
 
+    def cut(self) -> None:
+        """End the episode of the one room without a step; observers are not told.
+
+        Raises:
+            ValueError: there are several rooms.
+        """
+        if self.count != 1:
+            raise ValueError(f"cut: got {self.count} rooms, expected one")
+        self.running = np.zeros(1, np.bool_)
+
     def _checked(self, seat: Seat, actions: Any) -> Int64:
         """Actions of the right shape. Raises ValueError for others; the environment looks at their range."""
         found = np.asarray(actions)
@@ -201,9 +211,9 @@ class Agenda(Protocol):
 class _Queue:
     """Episodes 0 to N - 1, each once: a room plays the next that are left, a session of trials in a row."""
 
-    def __init__(self, episodes: int, trials: int = 1) -> None:
+    def __init__(self, episodes: int, trials: int = 1, sessions: Iterator[int] | None = None) -> None:
         self.trials = trials
-        self._waiting = iter(range(0, episodes, trials))
+        self._waiting = iter(range(0, episodes, trials)) if sessions is None else sessions
         self._next: dict[int, int] = {}
 
     def following(self, room: int) -> int | None:
@@ -219,7 +229,13 @@ class _Queue:
 
 
 class TestEpisodes(_Queue):
-    """Episodes 0 to N - 1 of the test set, as many in a row as there are trials in a session."""
+    """Episodes 0 to N - 1 of the test set, as many in a row as there are trials in a session.
+
+    Args:
+        episodes: N.
+        trials: how many in a row.
+        sessions: the first episodes of the sessions that are left, where several agendas share them.
+    """
 
     __test__ = False  # pytest takes it for a test
 
@@ -311,7 +327,16 @@ def play(
     playing = play_async(rooms, players, agenda, stop, wait)
     if any(inspect.iscoroutinefunction(getattr(policy, "act", None)) for policy in players.values()):
         asyncio.run(playing)
-        return
+    else:
+        at_once(playing)
+
+
+def at_once(playing: Coroutine[Any, Any, None]) -> None:
+    """Run what waits for nothing, without an event loop.
+
+    Raises:
+        ValueError: it waits for something.
+    """
     try:
         playing.send(None)
     except StopIteration:
@@ -330,17 +355,32 @@ async def play_async(
     """`play`, with policies that answer later."""
     if set(players) != set(rooms.seats):
         raise ValueError(f"players: got {sorted(players)}, expected one for each of {list(rooms.seats)}")
-    ended = np.ones(rooms.count, np.bool_)
-    while True:
-        if ended.any():
-            _begin(rooms, players, agenda, ended)
-        if not rooms.running.any() or stop():
-            return
-        try:
-            actions = {seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items()}
-        except PolicyDone:
-            return
-        ended = rooms.step(actions).ended
+    ended, leaving = np.ones(rooms.count, np.bool_), False
+    try:
+        while True:
+            if ended.any():
+                if leaving:
+                    await _leave(players)
+                _begin(rooms, players, agenda, ended)
+            if not rooms.running.any() or stop():
+                return
+            leaving = True
+            try:
+                actions = {seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items()}
+                ended = rooms.step(actions).ended
+            except EpisodeOver:
+                rooms.cut()
+                ended = np.ones(1, np.bool_)
+    except PolicyDone:
+        return
+
+
+async def _leave(players: Mapping[Seat, Policy]) -> None:
+    """Tell the policies that want to know of it that an episode is over."""
+    for policy in players.values():
+        leave = getattr(policy, "leave", None)
+        if leave is not None:
+            await leave()
 
 
 def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: Bools) -> None:
@@ -367,8 +407,10 @@ async def _asked(rooms: Rooms, seat: Seat, policy: Policy, wait: float | None) -
     """The actions that a policy chooses."""
     try:
         actions = policy.act(rooms.observations[seat])
-        return await asyncio.wait_for(actions, wait) if inspect.isawaitable(actions) else actions
-    except PolicyDone:
+        if inspect.isawaitable(actions):
+            return await (actions if wait is None else asyncio.wait_for(actions, wait))
+        return actions
+    except (PolicyDone, EpisodeOver):
         raise
     except TimeoutError:
         raise ValueError(f"{seat}: {type(policy).__name__} did not answer within {wait} s") from None

@@ -36,11 +36,27 @@ class Policy(Protocol):
 
         Raises:
             PolicyDone: play stops here, in the middle of the episode.
+            EpisodeOver: the episode of the one room ends here, without a step; play goes on with the next.
         """
 
 
 class PolicyDone(Exception):  # noqa: N818 - no error
     """A policy has no further action."""
+
+
+class EpisodeOver(Exception):  # noqa: N818 - no error
+    """A policy ends its episode without an action."""
+
+
+class Leaving(Protocol):
+    """A policy that has something to do once an episode has ended, such as answering questions about it."""
+
+    async def leave(self) -> None:
+        """The episode of the one room is over, and another one may begin.
+
+        Raises:
+            PolicyDone: play stops here.
+        """
 
 
 class RandomPolicy:

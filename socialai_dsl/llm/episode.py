@@ -9,17 +9,17 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.briefing import Briefing, brief
+from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing, brief
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import ScenarioEnv, make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.factory import Scenario, load_playable
-from socialai_dsl.episodes.play import AGENT, Rooms
+from socialai_dsl.episodes.play import AGENT, Rooms, Step
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import LastStep, Style, TextView, over
-from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.program_suite import Playable, outcome_name
 
 OnInvalid = Literal["noop", "retry", "fail"]
 """What a reply without an action does: pass the turn, ask again, or end the episode."""
@@ -90,49 +90,58 @@ class EpisodeResult:
     stopped: int = 0
 
 
-class Episode(Copied):
-    """The agent's seat of one room, played in text, episode after episode.
+@dataclass(frozen=True)
+class Decision:
+    """What a reply comes to.
+
+    Attributes:
+        action: the action to be played; None where no step is.
+        error: what was wrong with the reply; the action is to do nothing then.
+        turn: the result of the reply where no step is played.
+    """
+
+    action: Action | None
+    error: str = ""
+    turn: Turn | None = None
+
+
+class TextSeat(Copied):
+    """The agent's seat of one room in text: writes what is seen, reads replies, and counts. Others play the steps.
 
     Args:
-        scenario: a path, a name or a program.
+        program: of a scenario or suite.
         style: how observations are written: `prose`, `grid` or `json`.
         mode: how replies are given: `text`, `json` or `tools`.
         on_invalid: the effect of a reply without an action: `noop` passes the turn, `retry` asks again (the third such
             reply in a row passes the turn), `fail` ends the episode.
-        briefing: what the instructions say of the task, see `brief`; by default what the scenario's file says, and
-            of a program nothing.
+        briefing: what the instructions say of the task.
         probes: the scenario as `load` returns it, to ask its probes, which changes nothing else.
 
     Attributes:
-        instructions: the text that a model reads before the first observation; of a suite, once `reset` has drawn
-            what is played.
+        instructions: the text that a model reads before the first observation; of a suite, once an episode has begun.
         actions: the actions of this episode, int64 (heads,) each.
         answered: the answers to probes of this episode, in the order given.
 
     Raises:
-        ScenarioError: the scenario has mistakes.
         ValueError: an argument is not what was expected.
     """
 
     def __init__(
         self,
-        scenario: Scenario,
+        program: Playable,
         style: Style = "prose",
         mode: Mode = "text",
         on_invalid: OnInvalid = "noop",
-        briefing: Briefing | None = None,
+        briefing: Briefing = NO_BRIEFING,
         probes: Loaded | None = None,
     ) -> None:
         if on_invalid not in get_args(OnInvalid):
             raise ValueError(
                 f"on_invalid: got {on_invalid!r}, expected one of {', '.join(get_args(OnInvalid))}"
             )
-        program, loaded = load_playable(scenario)
-        self._rooms = Rooms(make(program))
-        self.env: ScenarioEnv = self._rooms.env
-        self.view = TextView(self.env.program, style)
-        self.language = ActionLanguage(self.env.program)
-        self.briefing = brief(loaded) if briefing is None else briefing
+        self.view = TextView(program, style)
+        self.language = ActionLanguage(program)
+        self.briefing = briefing
         self._mode: Mode = mode
         self._member: str | None = None
         self.instructions = self.view.instructions(mode, self.briefing.text())
@@ -144,31 +153,25 @@ class Episode(Copied):
         self._refused = 0
         self._result = EpisodeResult()
         self._text = ""
+        self._image = np.zeros(0, np.uint8)
 
-    def reset(self, seed: int | None = None, test_episode: int | None = None) -> str:
-        """Begin an episode and return what is seen at its start.
-
-        Args:
-            seed: starts episode 0 of the seed; without it the next one is played.
-            test_episode: number of an episode of the fixed test set.
-
-        Raises:
-            ValueError: a number is out of range.
-            RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
-        """
-        options = None if test_episode is None else {"test_episode": test_episode}
-        self._rooms.begin({"seed": seed, "options": options})
+    def begin(self, rooms: Rooms, seed: int | None = None, options: Mapping[str, Any] | None = None) -> str:
+        """Note that an episode has begun in the room, by these arguments of `env.reset`; what is seen at its start."""
+        seen = _seen(rooms)
         self.actions, self._refused, self._result = [], 0, EpisodeResult()
         self.answered = []
         if self._asker is not None:
-            self._questions = self._asker.reset(seed, options, self._seen["image"])
-        self._member = self._rooms.info.get("member")
+            self._questions = self._asker.reset(
+                seed, None if options is None else dict(options), seen["image"]
+            )
+        self._member = rooms.info.get("member")
         self.instructions = self.view.instructions(self._mode, self.briefing.text(self._member))
-        self._text = self.view.observe(self._seen, self._rooms.info)
+        self._image = seen["image"].copy()
+        self._text = self.view.observe(seen, rooms.info)
         return self._text
 
-    def step(self, reply: Reply, stop: str = "") -> Turn:
-        """Play the action of a reply.
+    def read(self, reply: Reply, stop: str = "") -> Decision:
+        """What a reply comes to.
 
         Args:
             reply: text, or in the mode `tools` a sequence of `ToolCall`.
@@ -185,7 +188,26 @@ class Episode(Copied):
             stopped = _STOPS.get(stop)
             return self._refuse(f"{stopped}." if stopped else parsed.error, stopped is not None)
         self._refused = 0
-        return self._play(parsed.action)
+        return Decision(parsed.action)
+
+    def saw(self, rooms: Rooms, decision: Decision, step: Step) -> Turn:
+        """The result of a decision whose action was played in the room."""
+        assert decision.action is not None, "internal: a step was played"
+        seen, encoded = _seen(rooms), step.actions[AGENT][0]
+        self.actions.append(encoded)
+        done, reward = bool(step.ended[0]), float(step.reward[0])
+        if self._asker is not None:
+            self._questions = self._asker.step(encoded, seen["image"], done)
+        self._note(reward, played=True)
+        success = bool(step.success[0]) if done else None
+        if success is not None:
+            self._result = replace(self._result, ending=outcome_name(step.info), success=success)
+        last = LastStep(decision.action.movement, self._image, success)
+        self._text = self._news(step.info) + self.view.observe(seen, step.info, last)
+        self._image = seen["image"].copy()
+        error = decision.error
+        told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
+        return Turn(told + self._text, reward, done, decision.action, error)
 
     def end(self, ending: str = CONTEXT) -> None:
         """End the episode without a step.
@@ -227,11 +249,7 @@ class Episode(Copied):
         """The figures of the episode so far."""
         return self._result
 
-    def close(self) -> None:
-        """Let the environment go."""
-        self.env.close()
-
-    def _refuse(self, error: str, stopped: bool) -> Turn:
+    def _refuse(self, error: str, stopped: bool) -> Decision:
         """Deal with a reply that holds no action."""
         self._refused += 1
         self._result = replace(
@@ -240,35 +258,14 @@ class Episode(Copied):
         if self._on_invalid == "fail":
             self._note()
             self.end(STOPPED if stopped else INVALID)
-            return Turn(f"Your reply was not understood: {error}\n{over(False)}", 0.0, True, None, error)
+            text = f"Your reply was not understood: {error}\n{over(False)}"
+            return Decision(None, error, Turn(text, 0.0, True, None, error))
         if self._on_invalid == "retry" and self._refused < _TRIES:
             self._note()
             text = f"Your reply was not understood: {error} Reply again.\n{self._text}"
-            return Turn(text, 0.0, False, None, error)
+            return Decision(None, error, Turn(text, 0.0, False, None, error))
         self._refused = 0
-        return self._play(Action(), error)
-
-    def _play(self, action: Action, error: str = "") -> Turn:
-        encoded = self.env.encode_action(action)
-        before = self._seen["image"].copy()
-        step = self._rooms.step({AGENT: encoded[None]})
-        self.actions.append(encoded)
-        done, reward = bool(step.ended[0]), float(step.reward[0])
-        if self._asker is not None:
-            self._questions = self._asker.step(encoded, self._seen["image"], done)
-        self._note(reward, played=True)
-        success = bool(step.success[0]) if done else None
-        if success is not None:
-            self._result = replace(self._result, ending=outcome_name(step.info), success=success)
-        last = LastStep(action.movement, before, success)
-        self._text = self._news(step.info) + self.view.observe(self._seen, step.info, last)
-        told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
-        return Turn(told + self._text, reward, done, action, error)
-
-    @property
-    def _seen(self) -> dict[str, NDArray[Any]]:
-        """The present observation."""
-        return {name: value[0] for name, value in self._rooms.observations[AGENT].items()}
+        return Decision(Action(), error)
 
     def _news(self, info: Mapping[str, Any]) -> str:
         """What is told where an episode goes on with another member of a suite; mostly nothing."""
@@ -282,6 +279,74 @@ class Episode(Copied):
         self._result = replace(
             before, total=before.total + reward, steps=before.steps + played, replies=before.replies + 1
         )
+
+
+class Episode(TextSeat):
+    """One room, played in text by whoever replies, episode after episode.
+
+    Args:
+        scenario: a path, a name or a program.
+        style, mode, on_invalid, probes: see `TextSeat`.
+        briefing: what the instructions say of the task, see `brief`; by default what the scenario's file says, and
+            of a program nothing.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        ValueError: an argument is not what was expected.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        style: Style = "prose",
+        mode: Mode = "text",
+        on_invalid: OnInvalid = "noop",
+        briefing: Briefing | None = None,
+        probes: Loaded | None = None,
+    ) -> None:
+        program, loaded = load_playable(scenario)
+        super().__init__(
+            program, style, mode, on_invalid, brief(loaded) if briefing is None else briefing, probes
+        )
+        self._rooms = Rooms(make(program))
+        self.env: ScenarioEnv = self._rooms.env
+
+    def reset(self, seed: int | None = None, test_episode: int | None = None) -> str:
+        """Begin an episode and return what is seen at its start.
+
+        Args:
+            seed: starts episode 0 of the seed; without it the next one is played.
+            test_episode: number of an episode of the fixed test set.
+
+        Raises:
+            ValueError: a number is out of range.
+            RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
+        """
+        options = None if test_episode is None else {"test_episode": test_episode}
+        self._rooms.begin({"seed": seed, "options": options})
+        return self.begin(self._rooms, seed, options)
+
+    def step(self, reply: Reply, stop: str = "") -> Turn:
+        """Play the action of a reply, as `read` takes it.
+
+        Raises:
+            ValueError: the episode has ended.
+        """
+        decision = self.read(reply, stop)
+        if decision.turn is not None:
+            return decision.turn
+        assert decision.action is not None, "internal: what plays no step has a turn"
+        step = self._rooms.step({AGENT: self.env.encode_action(decision.action)[None]})
+        return self.saw(self._rooms, decision, step)
+
+    def close(self) -> None:
+        """Let the environment go."""
+        self.env.close()
+
+
+def _seen(rooms: Rooms) -> dict[str, NDArray[Any]]:
+    """The present observation of the agent's seat in the one room."""
+    return {name: value[0] for name, value in rooms.observations[AGENT].items()}
 
 
 def scripted_reply(episode: Episode) -> str:

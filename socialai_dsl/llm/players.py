@@ -7,10 +7,10 @@ import json
 import os
 import secrets
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
-from itertools import count, islice, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -19,12 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.atomic import write_json
-from socialai_dsl.checking.briefing import Briefing
+from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.envs import make
 from socialai_dsl.envs.asking import Question
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step, TestEpisodes, at_once, play_async
+from socialai_dsl.episodes.policies import EpisodeOver, Observation, PolicyDone
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
-from socialai_dsl.llm.episode import CONTEXT, CUT_SHORT, Episode, EpisodeResult, OnInvalid, Reply, Turn
+from socialai_dsl.llm.episode import CONTEXT, CUT_SHORT, Decision, EpisodeResult, OnInvalid, TextSeat, Turn
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.replies import readable
@@ -174,14 +177,19 @@ def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpis
         raise OtherSettings(f"{folder} holds episodes of another version of this program")
     if settings.get("program_sha256") != program.sha256:
         raise OtherSettings(f"{folder} holds episodes of another version of the scenario")
-    episode = Episode(program, **manner.of_episodes)
+
+    async def nobody(conversation: Conversation) -> Answer:
+        raise PolicyDone
+
+    policy = ModelPolicy(
+        TextSeat(program, **manner.of_episodes), manner, lambda number: _transcript(folder, number), nobody
+    )
+    rooms = Rooms(make(program), [policy])
     try:
-        paths = (_transcript(folder, number) for number in count())
-        found = enumerate(takewhile(Path.exists, islice(paths, most)))
-        played = (Conversation(episode, manner, number, path).played() for number, path in found)
-        return list(takewhile(lambda one: one.ended, played))
+        at_once(play_async(rooms, {AGENT: policy}, TestEpisodes(most, manner.trials)))
+        return policy.played[:most]
     finally:
-        episode.close()
+        rooms.env.close()
 
 
 class LanguageModelPlayer:
@@ -206,7 +214,7 @@ class LanguageModelPlayer:
         manner: Manner,
         place: Callable[[int], Path],
         loaded: Loaded | None = None,
-        briefing: Briefing | None = None,
+        briefing: Briefing = NO_BRIEFING,
     ) -> None:
         self._briefing = briefing
         self._loaded = None if manner.probes == "off" else loaded
@@ -247,40 +255,36 @@ class LanguageModelPlayer:
     ) -> list[PlayedEpisode]:
         trials = self._manner.trials
         sessions = iter(range(0, episodes, trials))
-        played: list[PlayedEpisode] = []
+        policies: list[ModelPolicy] = []
         failures: list[Exception] = []
 
         async def work(client: httpx.AsyncClient) -> None:
-            episode = Episode(
+            async def ask(conversation: Conversation) -> Answer:
+                # After a failure the others play what they have asked for, which is paid for, and stop as well.
+                if failures or budget.is_spent(self._spent):
+                    raise PolicyDone
+                return await self._ask(client, conversation)
+
+            seat = TextSeat(
                 self._program, **self._manner.of_episodes, briefing=self._briefing, probes=self._loaded
             )
+            policy = ModelPolicy(seat, self._manner, self._place, ask, progress)
+            policies.append(policy)
+            rooms = Rooms(make(self._program), [policy])
             try:
-                for first in sessions:
-                    before: Conversation | None = None
-                    for number in range(first, first + trials):
-                        path = self._place(number)
-                        _mend(path)
-                        conversation = Conversation(episode, self._manner, number, path, before)
-                        # After a failure the others play what they have asked for, which is paid for, and stop as well.
-                        while not (conversation.done or failures or budget.is_spent(self._spent)):
-                            conversation.add(await self._ask(client, conversation))
-                        played.append(conversation.played())
-                        if progress is not None:
-                            progress(played[-1])
-                        if not conversation.done:
-                            break
-                        before = conversation
+                await play_async(rooms, {AGENT: policy}, TestEpisodes(episodes, trials, sessions))
+                policy.stop()
             except (EndpointError, OSError) as error:
                 failures.append(error)
             finally:
-                episode.close()
+                rooms.env.close()
 
         async with self._endpoint.client() as client, asyncio.TaskGroup() as group:
-            for _ in range(min(concurrency, episodes)):
+            for _ in range(min(concurrency, episodes // trials)):
                 group.create_task(work(client))
         if failures:
             raise failures[0]
-        return sorted(played, key=lambda one: one.number)
+        return sorted((one for policy in policies for one in policy.played), key=lambda one: one.number)
 
     async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
         """The model's answer; also that the conversation has outgrown its context, which ends the episode."""
@@ -297,14 +301,103 @@ class LanguageModelPlayer:
         return answer
 
 
-class Conversation:
-    """An episode, its transcript, and the messages that a model is sent.
+class ModelPolicy(Observer):
+    """A language model on the agent's seat of one room, which observes that room as well.
+
+    Every reply is on disk before it is played. What a transcript holds already is played without asking.
 
     Args:
-        episode: is reset, and played as far as the transcript goes.
+        seat: writes what is seen, and reads what is replied.
+        manner: how the model plays.
+        place: of the transcript of each episode, see `transcripts`.
+        ask: the model's answer to a conversation; raises PolicyDone where it is not to be asked.
+        progress: is told of each episode that is over, or that `stop` ended.
+
+    Attributes:
+        played: these episodes.
+    """
+
+    def __init__(
+        self,
+        seat: TextSeat,
+        manner: Manner,
+        place: Callable[[int], Path],
+        ask: Callable[[Conversation], Awaitable[Answer]],
+        progress: Callable[[PlayedEpisode], None] | None = None,
+    ) -> None:
+        self._seat, self._manner, self._place, self._ask = seat, manner, place, ask
+        self._progress = progress
+        self._rooms: Rooms
+        self._conversation: Conversation
+        self._decision = Decision(None)
+        self._fired: Mapping[str, int] = {}
+        self._is_over = True
+        self.played: list[PlayedEpisode] = []
+
+    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """See `Policy.reset`; `began` knows which trials begin a session."""
+
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """See `Observer.began`."""
+        number = int(rooms.numbers[0])
+        before = self._conversation if number % self._manner.trials else None
+        path = self._place(number)
+        _mend(path)
+        text = self._seat.begin(rooms, options={"test_episode": number})
+        self._rooms, self._fired = rooms, rooms.env.counters()["rules"]
+        self._conversation = Conversation(self._seat, self._manner, number, path, text, before)
+        self._is_over = False
+
+    async def act(self, observation: Observation) -> NDArray[np.int64]:
+        """See `Policy.act`."""
+        while not self._seat.result().ending:
+            decision = await self._next()
+            if decision is not None and decision.action is not None:
+                self._decision = decision
+                encoded: NDArray[np.int64] = self._rooms.env.encode_action(decision.action)
+                return encoded[None]
+        raise EpisodeOver
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self._conversation.saw(self._seat.saw(rooms, self._decision, step))
+
+    async def leave(self) -> None:
+        """Answer what is asked after the last step; see `Leaving`."""
+        while self._seat.question is not None:
+            await self._next()
+        self._note()
+
+    def stop(self) -> None:
+        """Note an episode that is not over, if there is one."""
+        if not self._is_over:
+            self._note()
+
+    async def _next(self) -> Decision | None:
+        """Read the next record of the transcript, or the model's next answer."""
+        record = self._conversation.stored()
+        if record is None:
+            record = self._conversation.write(await self._ask(self._conversation))
+        return self._conversation.take(record)
+
+    def _note(self) -> None:
+        after = self._rooms.env.counters()["rules"]
+        fired = {name: count - self._fired.get(name, 0) for name, count in after.items()}
+        self.played.append(self._conversation.played(fired))
+        self._is_over = True
+        if self._progress is not None:
+            self._progress(self.played[-1])
+
+
+class Conversation:
+    """An episode's transcript, and the messages that a model is sent.
+
+    Args:
+        seat: where an episode has begun.
         manner: how the model plays.
         number: of the test episode.
         path: of the transcript, a line of JSON for each reply.
+        text: what is seen at the start.
         before: that of the trial before in the same session, which this one goes on with.
 
     Raises:
@@ -312,30 +405,33 @@ class Conversation:
     """
 
     def __init__(
-        self, episode: Episode, manner: Manner, number: int, path: Path, before: Conversation | None = None
+        self,
+        seat: TextSeat,
+        manner: Manner,
+        number: int,
+        path: Path,
+        text: str,
+        before: Conversation | None = None,
     ) -> None:
-        self._episode = episode
+        self._seat = seat
         self._manner = manner
         self._number = number
         self._path = path
         self._usage = Usage()
         self._stops: Counter[str] = Counter()
-        self._before = episode.env.counters()["rules"]
         closing = "" if before is None else f"{before.closing}\n\n"
         trial, trials = number % manner.trials + 1, manner.trials
         heading = f"Episode {trial} of {trials} begins, in a room of its own.\n" if trials > 1 else ""
-        self._text = f"{closing}{heading}{episode.reset(test_episode=number)}"
+        self._text = f"{closing}{heading}{text}"
         self._exchanges: list[list[Mapping[str, Any]]] = [] if before is None else [*before.exchanges]
         self._replies: list[list[tuple[str, str]]] = [[]]
-        for record in _records(path):
-            if self.done:
-                break
-            self._take(record)
+        self._records = _records(path)
+        self._last: tuple[str, str, list[ToolCall]] = "", "", []
+        self._is_full = False
 
-    @property
-    def done(self) -> bool:
-        """Whether nothing is left to be played or asked."""
-        return bool(self._episode.result().ending) and self._episode.question is None
+    def stored(self) -> dict[str, Any] | None:
+        """The next record that the transcript holds already; None if there is none."""
+        return next(self._records, None)
 
     @property
     def exchanges(self) -> Sequence[list[Mapping[str, Any]]]:
@@ -345,8 +441,7 @@ class Conversation:
     @property
     def closing(self) -> str:
         """What the model is told at the end, to which no reply is asked for."""
-        cut_short = self._episode.result().ending in CUT_SHORT
-        return f"{self._text}\nThe episode is over, without success." if cut_short else self._text
+        return f"{self._text}\nThe episode is over, without success." if self._is_full else self._text
 
     @property
     def begun(self) -> bool:
@@ -355,7 +450,7 @@ class Conversation:
 
     def messages(self) -> list[Mapping[str, Any]]:
         """The instructions, the exchanges so far, and what is seen now, perhaps with the question of a probe."""
-        question = self._episode.question
+        question = self._seat.question
         text = self._text if question is None else f"{self._text}\n\n{self._put(question)}"
         earlier = [str(exchange[0]["content"]) for exchange in self._exchanges]
         count, told = left_out(earlier, self._manner.history)
@@ -364,7 +459,7 @@ class Conversation:
             {"role": "user", "content": text},
         ]
         first = {**shown[0], "content": f"{told}{shown[0]['content']}"}
-        instructions = self._episode.instructions
+        instructions = self._seat.instructions
         if self._manner.trials > 1:
             instructions += (
                 f"\n\nYou play {self._manner.trials} episodes in a row, each in a room of its own, and are told how "
@@ -374,9 +469,9 @@ class Conversation:
 
     def constraints(self) -> dict[str, Any]:
         """The constraints of a request on the form of the reply."""
-        if self._episode.question is not None:
-            return constraints(self._episode.question, self._manner.mode, self._manner.grammar)
-        language = self._episode.language
+        if self._seat.question is not None:
+            return constraints(self._seat.question, self._manner.mode, self._manner.grammar)
+        language = self._seat.language
         if self._manner.mode == "tools":
             return {"tools": language.tools()}
         if self._manner.mode == "json":
@@ -384,9 +479,9 @@ class Conversation:
             return {"response_format": {"type": "json_schema", "json_schema": schema}}
         return {"grammar": language.gbnf()} if self._manner.grammar else {}
 
-    def add(self, answer: Answer) -> None:
-        """Write an answer down, then play it, or note it as that to a probe."""
-        question = self._episode.question
+    def write(self, answer: Answer) -> dict[str, Any]:
+        """Write an answer down; the record that stands in the transcript."""
+        question = self._seat.question
         record: dict[str, Any] = {"observation": self._text, "reply": answer.text}
         if question is not None:
             record |= {"probe": question.probe, "question": self._put(question), "right": question.right}
@@ -404,26 +499,24 @@ class Conversation:
             file.write(json.dumps(record, ensure_ascii=False) + "\n")
             file.flush()
             os.fsync(file.fileno())
-        self._take(record)
+        return record
 
-    def played(self) -> PlayedEpisode:
-        """The episode as far as it was played."""
-        after = self._episode.env.counters()["rules"]
-        rules = {name: count - self._before.get(name, 0) for name, count in after.items()}
+    def played(self, rules: Mapping[str, int]) -> PlayedEpisode:
+        """The episode as far as it was played, and how often rules fired."""
         return PlayedEpisode(
             self._number,
-            self._episode.result(),
-            list(self._episode.actions),
+            self._seat.result(),
+            list(self._seat.actions),
             [replies for replies in self._replies if replies],
             rules,
             self._usage,
             dict(self._stops),
-            tuple(self._episode.answered),
-            self._episode.question is not None,
+            tuple(self._seat.answered),
+            self._seat.question is not None,
         )
 
-    def _take(self, record: Mapping[str, Any]) -> None:
-        """Play a reply, or note it as that to a probe, and remember what was said."""
+    def take(self, record: Mapping[str, Any]) -> Decision | None:
+        """What a record comes to; None of one that answers a probe, or says that no more fits the model's context."""
         self._usage += Usage(
             record["prompt_tokens"],
             record["completion_tokens"],
@@ -433,28 +526,36 @@ class Conversation:
         )
         stop = record.get("stop", "")
         self._stops.update([stop] if stop else [])
-        if "probe" in record and self._episode.question is None:
-            return  # nobody asks now: the episode is played again from its transcript
-        if self._episode.question is not None:
+        if "probe" in record and self._seat.question is None:
+            return None  # nobody asks now: the episode is played again from its transcript
+        if self._seat.question is not None:
             if self._manner.probes == "kept":
-                put = {"role": "user", "content": self._put(self._episode.question)}
+                put = {"role": "user", "content": self._put(self._seat.question)}
                 self._exchanges.append(
                     [put, {"role": "assistant", "content": _shown(record["reply"]) or "(nothing)"}]
                 )
-            self._episode.answer(record["reply"])
-            return
+            self._seat.answer(record["reply"])
+            return None
         if stop == "context":
-            self._episode.end(CONTEXT)
+            self._seat.end(CONTEXT)
+            self._is_full = True
             self._replies[-1].append(("", CUT_SHORT[CONTEXT]))
-            return
+            return None
         calls = [ToolCall(*call) for call in record.get("calls", ())]
         # Who answers in words where tools are asked for may name the action there.
-        reply: Reply = calls or record["reply"]
-        turn = self._episode.step(reply, stop)
-        self._exchanges.append(_exchange(self._text, _shown(record["reply"]), calls, turn))
-        self._text = turn.text
+        decision = self._seat.read(calls or record["reply"], stop)
         written = "\n".join([record["reply"], *(f"{call.name}({call.arguments})" for call in calls)])
-        self._replies[-1].append((written.strip(), turn.error))
+        self._last = _shown(record["reply"]), written.strip(), calls
+        if decision.turn is not None:
+            self.saw(decision.turn)
+        return decision
+
+    def saw(self, turn: Turn) -> None:
+        """Remember what came of the reply that was read last."""
+        shown, written, calls = self._last
+        self._exchanges.append(_exchange(self._text, shown, calls, turn))
+        self._text = turn.text
+        self._replies[-1].append((written, turn.error))
         if turn.action is not None:
             self._replies.append([])
 

