@@ -23,7 +23,9 @@ from socialai_dsl.episodes.play import (
 )
 from socialai_dsl.episodes.players import ModelOptions, Player
 from socialai_dsl.episodes.policies import (
+    EpisodeOver,
     FunctionPolicy,
+    Leaving,
     Observation,
     Policy,
     PolicyDone,
@@ -41,9 +43,11 @@ __all__ = [
     "AGENT",
     "Actions",
     "Agenda",
+    "EpisodeOver",
     "EpisodesInARow",
     "EvalResult",
     "FunctionPolicy",
+    "Leaving",
     "ModelOptions",
     "Observation",
     "Observer",

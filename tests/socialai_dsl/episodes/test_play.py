@@ -13,6 +13,7 @@ import socialai_dsl as sd
 from socialai_dsl.episodes import (
     AGENT,
     Actions,
+    EpisodeOver,
     EpisodesInARow,
     FunctionPolicy,
     Observer,
@@ -98,6 +99,32 @@ def test_a_policy_may_answer_later() -> None:
 
     play(Rooms(envs(2), [log := Log()]), {AGENT: Later()}, TestEpisodes(2))
     assert log.steps == 40
+
+
+def test_a_policy_may_end_an_episode_and_is_told_of_every_end() -> None:
+    class Leaves(Still):
+        """Ends episode 1 before its third step."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.steps, self.left = [0], 0
+
+        def act(self, observation: Any) -> Any:
+            if len(self.steps) == 2 and self.steps[-1] == 2:
+                raise EpisodeOver
+            self.steps[-1] += 1
+            return super().act(observation)
+
+        async def leave(self) -> None:
+            self.left += 1
+            self.steps.append(0)
+
+    policy = Leaves()
+    play(Rooms(envs(1), [log := Log()]), {AGENT: policy}, TestEpisodes(3))
+    assert policy.steps == [20, 2, 20, 0]
+    assert (policy.left, log.begun) == (3, [[0], [1], [2]])
+    with pytest.raises(ValueError, match="cut: got 2 rooms, expected one"):
+        Rooms(envs(2)).cut()
 
 
 def test_a_policy_that_does_not_answer_is_not_waited_for() -> None:
