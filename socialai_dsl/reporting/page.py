@@ -31,6 +31,7 @@ from socialai_dsl.reporting.analysis import (
 )
 from socialai_dsl.reporting.collect import RunRecord
 from socialai_dsl.reporting.published import MARGIN
+from socialai_dsl.reporting.records import ResultRecord
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
@@ -320,12 +321,19 @@ def _players(section: Section) -> Rows:
                 {
                     "condition": summary.name,
                     "kind of mind": result.kind or _NONE,
-                    "told": "\n".join(filter(None, (result.tell, result.told))),
+                    "told": "\n".join([result.tell, *_told(result)]),
                     "saw": "the room" if result.view == "room" else "its seat's view",
                     "remembers": "one episode" if result.trials == 1 else f"{result.trials} episodes",
                 }
             )
     return rows if kinds - {"network"} else []
+
+
+def _told(result: ResultRecord) -> list[str]:
+    """The words that the player was told, by member of a suite."""
+    if isinstance(result.told, str):
+        return [result.told] if result.told else []
+    return [f"{member}: {words}" for member, words in result.told.items()]
 
 
 def _trials(summary: Summary) -> Iterator[dict[str, str]]:

@@ -67,13 +67,13 @@ class ResultRecord(Record):
 
     Attributes:
         kind: of mind: network, script, chance, model, person or policy; empty where an older version wrote it.
-        tell, told: what the player was told of the task. view: what it saw.
+        tell, told: what the player was told of the task, by member of a suite if they differ. view: what it saw.
         trials: how many episodes in a row it remembered.
     """
 
     kind: str = ""
     tell: str = "nothing"
-    told: str = ""
+    told: str | dict[str, str] = ""
     view: str = "seat"
     trials: int = Field(1, ge=1)
     frames: int = 0
