@@ -167,8 +167,8 @@ def _lead(analysis: Analysis) -> str:
         one["verdict"].partition(":")[0] for section in analysis.sections for one in section.published
     )
     if verdicts:
-        listed = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
-        parts.append(f"Beside {count_of(verdicts.total(), 'published figure')}: {listed}.")
+        listed = "; ".join(f"{verdict} ({count})" for verdict, count in verdicts.items())
+        parts.append(f"Ours beside {count_of(verdicts.total(), 'published figure')}: {listed}.")
     tested = [c["p_bonferroni"] for s in analysis.sections for c in s.comparisons if c["p"] is not None]
     if tested:
         found = sum(p < ALPHA for p in tested)
@@ -252,17 +252,15 @@ def _section(anchor: str, section: Section, drawings: Mapping[str, bytes]) -> di
 
 def _published(one: Mapping[str, Any]) -> dict[str, str]:
     test = f" on {scenario_name(one['test'])}" if one["test"] else ""
-    of = f"\nover {count_of(one['published_n'], 'seed')}" if one["published_n"] else ""
-    said = "\n".join(filter(None, (one["source"], one["note"])))
+    of = f"\n{count_of(one['published_n'], 'seed')}" if one["published_n"] else ""
     return {
-        "condition": one["condition"] + test,
-        "ours": figure(one["success_mean"], one["success_std"]) + f"\nover {count_of(one['seeds'], 'seed')}",
+        "condition": "\n".join(filter(None, (one["condition"] + test, one["source"], one["note"]))),
+        "verdict": one["verdict"].replace(": ", "\n"),
+        "ours": figure(one["success_mean"], one["success_std"]) + f"\n{count_of(one['seeds'], 'seed')}",
         "published": figure(one["published_mean"], one["published_std"], 2) + of,
-        "difference": difference(one),
+        "difference": difference(one).replace(" [", "\n[").replace(", ", ",\u00a0"),
         "p": p_value(one["p"]),
         "p corrected": p_value(one["p_bonferroni"]),
-        "verdict": one["verdict"],
-        "source": said,
     }
 
 

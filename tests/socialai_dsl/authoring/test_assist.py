@@ -77,6 +77,16 @@ def test_completion(old: str, new: str, expected: str | None) -> None:
         assert expected in found
 
 
+@pytest.mark.parametrize(
+    ("typed", "expected"), [("std: 0.1, ", "n"), ("dev", "deviation"), ("deviation: po", "population")]
+)
+def test_completion_in_a_reference_of_an_experiment(typed: str, expected: str) -> None:
+    text = "experiment: e\nconditions:\n  - {name: one, scenario: help, reference: {mean: 0.5"
+    whole = read_document(Source("", text + "}}\n")).data
+    plain, line, column = marked(f"{text}, {typed}^}}}}\n")
+    assert expected in [offer.text for offer in complete(plain, whole, None, line, column)]
+
+
 def test_no_prose_is_completed() -> None:
     assert offered(TEXT.replace("objects:", "about: The ^\nobjects:")) == []
     assert offered(TEXT.replace("objects:", "instructions: The <^\nobjects:")) == []

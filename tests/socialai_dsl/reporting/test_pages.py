@@ -62,7 +62,7 @@ def page(analysis: Analysis, drawings: dict[str, bytes]) -> Page:
 
 def test_the_page_begins_with_what_there_is(page: Page) -> None:
     assert "7 of 7 runs done, in 3 conditions; 7,000 frames trained in 10 min of run time." in page.text
-    assert "Beside 2 published figures: 1 not shown to differ, 1 not testable." in page.text
+    assert "Ours beside 2 published figures: not shown to differ (1); not testable (1)." in page.text
 
 
 @pytest.mark.parametrize("said", [
@@ -73,6 +73,24 @@ def test_the_page_begins_with_what_there_is(page: Page) -> None:
 ])  # fmt: skip
 def test_what_the_page_says(page: Page, said: str) -> None:
     assert said in page.text
+
+
+def test_published_figures_stand_beside_ours_with_a_verdict(page: Page) -> None:
+    own, other = page.table("verdict")
+    assert own[:5] == [
+        "Help / PPO",
+        "not shown to differ",
+        "0.500 ± 0.100",
+        "0.45 ± 0.05",
+        "+0.050",
+    ]
+    assert own[5] == own[6] != "–", "one test: nothing to correct"
+    assert other == [
+        "Help / PPO on help_as_helper", "not testable", "0.200 ± 0.100", "0.12", "+0.080", "–", "–",
+    ]  # fmt: skip
+    # Variances of the means: 0.01 / 3 and 0.0025 / 16; 2.19 degrees of freedom, whose quantile is 3.96.
+    for said in ("[\u22120.184, +0.284]", "no standard deviation published"):
+        assert said in page.text
 
 
 def test_the_page_needs_nothing_else(page: Page) -> None:
