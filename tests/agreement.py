@@ -55,9 +55,13 @@ class Pair:
         """The two number the words alike, and keep as many."""
         mine, yours = self.env.program, self.reference.vocabulary
         # 0 pads and 1 is unknown. Which numbers can be said is the compiler's to work out: those heard are compared.
-        numbers = {word for word in mine.vocabulary if word == "-" or word.isdigit()}
-        yours.telling |= numbers & {"-"}
-        got, wanted = ([w for w in found if w not in numbers] for found in (mine.vocabulary[2:], yours.ids))
+        if ("-" in yours.telling) != ("-" in mine.vocabulary):
+            yours.telling ^= {"-"}
+            yours.length = yours.longest_history()
+        got, wanted = (
+            [word for word in found if word != "-" and not word.isdigit()]
+            for found in (mine.vocabulary[2:], yours.ids)
+        )
         in_order = ([word for word in found if words(word) == [word]] for found in (got, wanted))
         if next(in_order) != next(in_order) or {*got} != {*wanted}:
             raise Disagreement(f"{mine.name}: the vocabulary is {got}, expected {wanted}")

@@ -107,7 +107,7 @@ def test_it_is_always_said_what_never_happens(gate: Path, claims: tuple[str, ...
 
 def test_json_has_the_same(gate: Path, capsys: Capture) -> None:
     name = claiming(gate, "{never: gave_up}")
-    assert main(["check", name, "--rooms", "2", "--format", "json"]) == 1
+    assert main(["check", name, "--rooms", "2", "--json"]) == 1
     (report,) = json.loads(capsys.readouterr().out)
     assert (report["scenario"], report["rooms"], report["seed"]) == (name, 2, 0)
     assert [part["name"] for part in report["never_happens"]] == [
@@ -226,7 +226,7 @@ def test_deep_tries_everything(gate: Path, capsys: Capture) -> None:
 
 
 def test_deep_as_json(gate: Path, capsys: Capture) -> None:
-    assert main(["check", str(gate), "--rooms", "3", "--deep", "--format", "json"]) == 0
+    assert main(["check", str(gate), "--rooms", "3", "--deep", "--json"]) == 0
     (report,) = json.loads(capsys.readouterr().out)
     assert report["success"]["steps"] == [3, 3, 3]
     assert report["success"]["unsolved"] is None

@@ -37,7 +37,7 @@ def test_a_mistake_is_shown_with_its_line(capsys: Capture) -> None:
 
 
 def test_a_folder_is_searched_and_json_is_pure(capsys: Capture) -> None:
-    assert main(["validate", ".", "--format", "json"]) == 1
+    assert main(["validate", ".", "--json"]) == 1
     (finding,) = json.loads(capsys.readouterr().out)
     assert (finding["file"], finding["line"], finding["severity"]) == ("broken.yaml", 4, "error")
 
@@ -99,7 +99,7 @@ def test_at_most_so_many_errors(many_mistakes: None, capsys: Capture) -> None:
     ]
     assert [finding.split(":")[0] for finding in findings] == ["one.yaml"] * 3 + ["two.yaml"]
     assert summary == "2 files checked: 4 errors shown, more left out, 0 warnings"
-    assert main([*command, "--format", "json"]) == 1
+    assert main([*command, "--json"]) == 1
     assert len(json.loads(capsys.readouterr().out)) == 4
 
 
@@ -137,7 +137,7 @@ outcome: [{success: agent.did(done) and $asks}]
 
 def test_every_value_of_a_parameter_is_checked_alone(capsys: Capture) -> None:
     Path("choosing.yaml").write_text(CHOOSING)
-    assert main(["validate", "choosing.yaml", "--format", "json"]) == 1
+    assert main(["validate", "choosing.yaml", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert [(d["line"], d["code"], d["hint"]) for d in found] == [
         (10, "S106", "with `choosing?n=40`"),
@@ -145,7 +145,7 @@ def test_every_value_of_a_parameter_is_checked_alone(capsys: Capture) -> None:
     ]
     assert main(["validate", "choosing.yaml?n=1&where=drawn"]) == 0
     Path("choosing.yaml").write_text(CHOOSING.replace("horizon", "horizn"))
-    assert main(["validate", "choosing.yaml", "--format", "json"]) == 1
+    assert main(["validate", "choosing.yaml", "--json"]) == 1
     assert [d["code"] for d in json.loads(capsys.readouterr().out.partition("\n")[2] or "[]")] in (
         [],
         ["S101"],
@@ -170,9 +170,7 @@ check: [{never: agent.did(toggle)}]
 
 def test_deep_tries_what_has_no_errors_out(capsys: Capture) -> None:
     Path("claiming.yaml").write_text(CLAIMING)
-    assert (
-        main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--rooms", "3", "--format", "json"]) == 1
-    )
+    assert main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--rooms", "3", "--json"]) == 1
     found = {(d["file"], d["code"], d["line"]) for d in json.loads(capsys.readouterr().out)}
     assert found >= {("claiming.yaml", "S801", 10), ("claiming.yaml", "W802", 9)}
     assert {file for file, *_ in found} == {"claiming.yaml", "broken.yaml"}
@@ -278,7 +276,8 @@ def test_machine_formats_keep_stdout_pure(
     Path("hostile.yaml").write_text(text, encoding="utf-8")
     terminal = _Terminal()
     monkeypatch.setattr("sys.stdout", terminal)
-    assert main(["validate", "hostile.yaml", "--format", style]) == 1
+    asked = ["--json"] if style == "json" else ["--format", style]
+    assert main(["validate", "hostile.yaml", *asked]) == 1
     captured = terminal.getvalue()
     assert captured.replace("\n", "").isprintable()
     if style in ("json", "sarif"):

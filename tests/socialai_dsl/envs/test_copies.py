@@ -285,7 +285,7 @@ def undone(game: Any) -> list[Any]:
     game.act("left", None)
     game.undo()
     game.act("right", "Where is the exit")
-    return [game.now.snapshot, game.now.lines, game.steps]
+    return [game._stage.moments[-1].snapshot, game.now.lines, game.steps]
 
 
 def stepped(table: Any) -> list[Any]:
