@@ -255,8 +255,12 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
 def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> None:
     """Report a quantifier that is not known, or lacks a part."""
     if node.name not in QUANTIFIERS:
-        near = did_you_mean(node.name, QUANTIFIERS)
-        raise resolver.fail("S205", f"`{node.name}(d in ...)` is not known", node, scope, suggestion=near)
+        message = f"`{node.name}({node.var} in ...)` is not known"
+        if node.name in WORDS and node.where is None and node.to is None:
+            condition = f"`{node.name}(({node.var} in {quoted(node.group)}))`"
+            hint = f"a comparison with `in` takes brackets of its own: {condition}"
+            raise resolver.fail("S205", message, node, scope, hint=hint)
+        raise resolver.fail("S205", message, node, scope, suggestion=did_you_mean(node.name, QUANTIFIERS))
     if node.var in WORDS or node.var in resolver.symbols.declared:
         message = f"the variable `{node.var}` has a name that means something already"
         raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")

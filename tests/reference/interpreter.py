@@ -355,6 +355,8 @@ class Reference:
             found = evaluate(value, Context(self.world))
         except NothingFoundError:
             return None
+        if found is None or found is NOTHING:
+            return None
         return ("yes" if found else "no") if isinstance(found, bool) else str(found)
 
     def scripted_action(self) -> Action:

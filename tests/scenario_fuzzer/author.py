@@ -649,11 +649,11 @@ class _Author:
         answer = self.rng.choice((*values, phrases.condition))(where)
         probe: dict[str, Any] = {
             "ask": f"What is <{phrases.in_text(self.rng.choice(values), where)}>",
-            "answer": f"prev({answer})" if self.often(0.2) else answer,
+            "answer": f"prev(({answer}))" if self.often(0.2) else answer,
         }
         if self.often(0.8):
             condition = phrases.condition(where)
-            probe["when"] = f"prev({condition})" if self.often(0.2) else condition
+            probe["when"] = f"prev(({condition}))" if self.often(0.2) else condition
         if self.often(0.3):
             probe["answers"] = ["this", f"<{phrases.in_text(self.rng.choice(values), where)}>", "No."]
         return probe
