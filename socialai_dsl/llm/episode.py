@@ -203,7 +203,7 @@ class TextSeat(Copied):
         if success is not None:
             self._result = replace(self._result, ending=outcome_name(step.info), success=success)
         last = LastStep(decision.action.movement, self._image, success)
-        self._text = self._news(step.info) + self.view.observe(seen, step.info, last)
+        self._text = self.view.observe(seen, step.info, last, self._news(step.info))
         self._image = seen["image"].copy()
         error = decision.error
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
@@ -271,7 +271,7 @@ class TextSeat(Copied):
         """What is told where an episode goes on with another member of a suite; mostly nothing."""
         before, self._member = self.briefing.text(self._member), info.get("member")
         now = self.briefing.text(self._member)
-        return f"{now}\n\n" if now != before else ""
+        return now if now != before else ""
 
     def _note(self, reward: float = 0.0, played: bool = False) -> None:
         """Count a reply, and the step that it played."""

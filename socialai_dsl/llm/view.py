@@ -151,7 +151,11 @@ class TextView:
         return f"{laws.ending(self._members.values())} {goal or UNTOLD}"
 
     def observe(
-        self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], last: LastStep | None = None
+        self,
+        observation: Mapping[str, NDArray[Any]],
+        info: Mapping[str, Any],
+        last: LastStep | None = None,
+        told: str = "",
     ) -> str:
         """The observation of the present moment as text.
 
@@ -159,6 +163,7 @@ class TextView:
             observation: of `ScenarioEnv`.
             info: of the same step.
             last: the step before it; None at the start of an episode.
+            told: what is told of the task from here on, where that changes.
         """
         image = observation["image"]
         seen = self._described(image.tobytes(), self._directions(info))
@@ -167,10 +172,15 @@ class TextView:
         stayed = last is not None and last.movement == "forward" and _stayed(last.before, image)
         success = None if last is None else last.success
         if self._style == "json":
-            more = {"heard": heard, **({"moved": False} if stayed else {})}
+            more = {
+                "heard": heard,
+                **({"moved": False} if stayed else {}),
+                **({"told": told} if told else {}),
+            }
             more |= {} if success is None else {"over": True, "success": success}
             return f"{seen[:-1]}, {json.dumps(more, ensure_ascii=False)[1:]}"
-        lines = ["You did not move."] if stayed else []
+        lines = [told, ""] if told else []
+        lines += ["You did not move."] if stayed else []
         lines += (
             [seen, "You hear:", *(f"- {line}" for line in heard)] if heard else [seen, "You hear nothing."]
         )

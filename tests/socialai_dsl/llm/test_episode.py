@@ -204,3 +204,29 @@ def test_hostile_replies_only_waste_their_turn(episode: Episode) -> None:
         assert turn.error
         assert len(turn.text) < 5000
         assert all(c.isprintable() or c == "\n" for c in turn.text)
+
+
+ACT = """\
+horizon: 9
+grammar: {templates: [Say <noun>], nouns: [hello, bye]}
+room: {size: 5}
+cast: {agent: {at: [1, 1], facing: right}}
+outcome: [{success: agent.did(forward)}]
+"""
+
+
+@pytest.mark.parametrize("style", ["prose", "grid", "json"])
+def test_what_an_act_tells_stands_before_what_is_seen_or_is_a_key(style: Style, tmp_path: Path) -> None:
+    for name, told in (("one", "Walk on."), ("two", "Wait here.")):
+        (tmp_path / f"{name}.yaml").write_text(f"scenario: {name}\ninstructions: {told}\n{ACT}")
+    suite = tmp_path / "both.yaml"
+    suite.write_text("suite: both\ndraw: in_sequence\nmembers: [one.yaml, two.yaml]\n")
+    episode = Episode(str(suite), style)
+    assert "Wait here." not in episode.reset(seed=0)
+    first, second = episode.step("Act: left").text, episode.step("Act: forward").text
+    if style == "json":
+        assert "told" not in json.loads(first)
+        assert json.loads(second)["told"] == "Wait here."
+    else:
+        assert "Wait here." not in first
+        assert second.startswith("Wait here.\n\nYou see")
