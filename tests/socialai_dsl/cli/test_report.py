@@ -31,7 +31,7 @@ def test_everything_is_written(folder: Path, capsys: Capture) -> None:
     names = {path.name for path in out.iterdir()} - {path.name for path in out.glob("*.parquet")}
     assert names == {
         "index.html", "figures",
-        "runs.csv", "conditions.csv", "comparisons.csv", "rooms.csv", "outcomes.csv",
+        "runs.csv", "conditions.csv", "comparisons.csv", "rooms.csv", "outcomes.csv", "published.csv",
     }  # fmt: skip
     page = (out / "index.html").read_text(encoding="utf-8")
     for name in ("part1-success", "part1-curves1", "part1-endings1-1"):
