@@ -1080,6 +1080,17 @@ def test_5_27_what_then_changes_is_settled_later(play: Folder) -> None:
     """)
     assert alone.step().status("door") == "closed", "after the rules of the world"
 
+    idle = play("""
+        objects:
+          switch: {type: switch, at: [4, 0], unlocks: door}
+          door: {type: door, at: [5, 0], state: locked}
+        state: {was_locked: false}
+        frames: {press: {states: {s: {then: [{cause: [switch.become(pressed)]}]}}}}
+        cast: {ann: {at: [5, 5], frame: press}, bob: {at: [4, 5]}}
+        rules: [{when: door.locked, set: {was_locked: true}}]
+    """)
+    assert idle.step().state["state"]["was_locked"], "bob makes no body action"
+
 
 GOING = """
     frames:

@@ -246,11 +246,13 @@ def look_around(world: World, me: Entity) -> str:
     if number < 3:
         return "left"
 
+    floor = [cell for cell in world.interior() if cell not in world.terrain]
+
     def free(quarter: int, cells: int) -> bool:
         cell, way = me.cell, turned(me.facing, quarter)
         for _ in range(cells):
             cell = step_from(cell, way)  # type: ignore[arg-type]
-            if world.terrain.get(cell) is not None or not geometry.free(world, cell, me):
+            if cell not in floor or not geometry.free(world, cell, me):
                 return False
         return True
 

@@ -279,7 +279,9 @@ class Reference:
         if not npc.gone:
             runner.perform_utterance(turn)
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
-            self.settling.all()
+            # Who has neither a frame nor beliefs takes no turn, so nothing settles because of it.
+            if runner.frame is not None or any(self.sources.beliefs_of(npc)):
+                self.settling.all()
             runner.end(turn)
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
