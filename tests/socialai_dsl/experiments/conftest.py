@@ -73,9 +73,7 @@ class Place:
 
     def runs(self) -> dict[str, PlannedRun]:
         """Label -> run."""
-        document = read_experiment(self.out)
-        assert document is not None
-        return {run.label: run for run in runs_of(self.out, document)}
+        return {run.label: run for run in runs_of(self.out, read_experiment(self.out))}
 
     def until(self, holds: Callable[[], Any], seconds: float = 20) -> Any:
         """Wait for something, and return it."""

@@ -34,8 +34,7 @@ UPDATES = 30
 
 
 def runs_in(folder: Path) -> list[PlannedRun]:
-    document = read_experiment(folder)
-    return [] if document is None else runs_of(folder, document)
+    return runs_of(folder, read_experiment(folder)) if (folder / "experiment.json").exists() else []
 
 
 def table(folder: Path) -> dict[str, Any]:
