@@ -276,7 +276,7 @@ class EpisodesInARow:
 
     def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
         """See `Agenda.reset`."""
-        if not (numbers % self._each)[begun].any() and begun.all():
+        if not (numbers % self._each)[begun].any():
             return {"seed": self._seed}
         return {"options": {"reset_mask": begun}}
 

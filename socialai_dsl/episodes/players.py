@@ -125,7 +125,7 @@ class Player:
 
     @property
     def kind(self) -> str:
-        """What kind of mind plays: chance, script, person, model, network, or a policy of somebody's own."""
+        """What kind of mind plays: chance, script, person, model, network, or a policy in Python."""
         if self.policy is not None:
             return "policy"
         if self.is_model:

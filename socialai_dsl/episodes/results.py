@@ -62,7 +62,11 @@ class EvalResult:
         return len(self.success)
 
     def by_trial(self, trials: int) -> list[tuple[int, int]]:
-        """Successes and episodes of each trial of sessions of so many; episode n is trial n modulo their number."""
+        """Successes and episodes of each trial.
+
+        Args:
+            trials: how many a session has; episode n is trial n modulo `trials`.
+        """
         order = np.arange(self.episodes) % trials
         return [(int(self.success[order == t].sum()), int((order == t).sum())) for t in range(trials)]
 
@@ -121,7 +125,17 @@ class Results(Observer):
             self._outcome[numbers] = step.outcome[step.ended]
 
     def result(self, rules: Mapping[str, float] | None = None) -> EvalResult:
-        """The results of all N episodes, with the mean number of times that each rule fired."""
+        """The results of all N episodes, with the mean number of times that each rule fired.
+
+        Raises:
+            ValueError: an episode has not ended, since its policy stopped playing.
+        """
+        left = int((self._outcome < 0).sum())
+        if left:
+            raise ValueError(
+                f"policy: it stopped playing before the end of {left} of the {len(self._outcome)} episodes; expected "
+                "an action in every step"
+            )
         return EvalResult(
             self._success, self._outcome, self._lengths, self._returns, self._names, rules or {}
         )

@@ -20,11 +20,13 @@ class StageMoment:
     Attributes:
         snapshot: the environment's exact state.
         observations: of each seat, arrays of 1.
+        info: what the environment returned.
         running: bool (1,), whether the episode goes on.
     """
 
     snapshot: bytes
     observations: dict[Seat, Observation]
+    info: Mapping[str, Any]
     running: NDArray[np.bool_]
 
 
@@ -61,7 +63,7 @@ class Stage(Rooms):
         self.moments.pop()
         now = self.moments[-1]
         self.env.restore(now.snapshot)
-        self.observations, self.running = now.observations, now.running
+        self.observations, self.info, self.running = now.observations, now.info, now.running
         for observer in self.observers:
             observer.back(self)
         return True
@@ -78,4 +80,4 @@ class Stage(Rooms):
         return len(self.moments) - 1
 
     def _now(self) -> StageMoment:
-        return StageMoment(self.env.snapshot(), self.observations, self.running)
+        return StageMoment(self.env.snapshot(), self.observations, self.info, self.running)

@@ -116,10 +116,9 @@ def let_a_model_play(
         raise UsageError(f"--out: {error}; choose another folder") from None
     except EndpointError as error:
         raise UsageError(f"{error}. Episodes so far are kept in {folder}; the same command goes on") from None
-    ended = sum(episode.ended for episode in played)
-    if ended < episodes:
+    if len(played) < episodes:
         raise RunFailed(
-            f"the budget is spent: {ended} of {episodes} episodes are over; the same command goes on with "
+            f"the budget is spent: {len(played)} of {episodes} episodes are over; the same command goes on with "
             f"another {options.budget}"
         )
     return _outcome(played, program, {"text": TextView.version} | _probes(played, names))

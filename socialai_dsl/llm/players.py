@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import secrets
@@ -90,7 +91,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class PlayedEpisode:
-    """A test episode as far as it was played.
+    """A test episode that was played to its end.
 
     Attributes:
         number: of the test episode.
@@ -100,7 +101,7 @@ class PlayedEpisode:
         rules: how often each of the scenario's rules fired.
         usage: what its replies took.
         stops: why the server ended replies before their end, `length` and the like, and how often.
-        answered: the answers to probes. asking: whether a question waits for its answer.
+        answered: the answers to probes.
     """
 
     number: int
@@ -111,12 +112,6 @@ class PlayedEpisode:
     usage: Usage
     stops: Mapping[str, int] = field(default_factory=dict)
     answered: Sequence[AnsweredQuestion] = ()
-    asking: bool = False
-
-    @property
-    def ended(self) -> bool:
-        """Whether it was played to its end, and all questions were answered."""
-        return bool(self.result.ending) and not self.asking
 
 
 class OtherSettings(ValueError):  # noqa: N818 - it says what was found
@@ -238,7 +233,7 @@ class LanguageModelPlayer:
             episodes: how many.
             concurrency: how many are played at once.
             budget: when it is spent, no further request is made; what is on the way is waited for.
-            progress: is told of each episode that is over, or was stopped because of the budget.
+            progress: is told of each episode that is over.
 
         Raises:
             EndpointError: the endpoint does not answer. What was played is kept.
@@ -261,8 +256,10 @@ class LanguageModelPlayer:
         async def work(client: httpx.AsyncClient) -> None:
             async def ask(conversation: Conversation) -> Answer:
                 # After a failure the others play what they have asked for, which is paid for, and stop as well.
-                if failures or budget.is_spent(self._spent):
+                if failures:
                     raise PolicyDone
+                if budget.is_spent(self._spent):
+                    raise EpisodeOver  # a later one may be in its transcript, which costs nothing
                 return await self._ask(client, conversation)
 
             seat = TextSeat(
@@ -273,7 +270,6 @@ class LanguageModelPlayer:
             rooms = Rooms(make(self._program), [policy])
             try:
                 await play_async(rooms, {AGENT: policy}, TestEpisodes(episodes, trials, sessions))
-                policy.stop()
             except (EndpointError, OSError) as error:
                 failures.append(error)
             finally:
@@ -310,8 +306,9 @@ class ModelPolicy(Observer):
         seat: writes what is seen, and reads what is replied.
         manner: how the model plays.
         place: of the transcript of each episode, see `transcripts`.
-        ask: the model's answer to a conversation; raises PolicyDone where it is not to be asked.
-        progress: is told of each episode that is over, or that `stop` ended.
+        ask: the model's answer to a conversation; raises EpisodeOver to leave that episode as it is, and PolicyDone to
+            leave all that are left.
+        progress: is told of each episode that is over.
 
     Attributes:
         played: these episodes.
@@ -331,7 +328,6 @@ class ModelPolicy(Observer):
         self._conversation: Conversation
         self._decision = Decision(None)
         self._fired: Mapping[str, int] = {}
-        self._is_over = True
         self.played: list[PlayedEpisode] = []
 
     def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
@@ -342,11 +338,9 @@ class ModelPolicy(Observer):
         number = int(rooms.numbers[0])
         before = self._conversation if number % self._manner.trials else None
         path = self._place(number)
-        _mend(path)
         text = self._seat.begin(rooms, options={"test_episode": number})
         self._rooms, self._fired = rooms, rooms.env.counters()["rules"]
         self._conversation = Conversation(self._seat, self._manner, number, path, text, before)
-        self._is_over = False
 
     async def act(self, observation: Observation) -> NDArray[np.int64]:
         """See `Policy.act`."""
@@ -363,15 +357,12 @@ class ModelPolicy(Observer):
         self._conversation.saw(self._seat.saw(rooms, self._decision, step))
 
     async def leave(self) -> None:
-        """Answer what is asked after the last step; see `Leaving`."""
-        while self._seat.question is not None:
-            await self._next()
-        self._note()
-
-    def stop(self) -> None:
-        """Note an episode that is not over, if there is one."""
-        if not self._is_over:
-            self._note()
+        """Answer what is asked after the last step, and note the episode; see `Leaving`."""
+        with contextlib.suppress(EpisodeOver):
+            while self._seat.question is not None:
+                await self._next()
+            if self._seat.result().ending:
+                self._note()
 
     async def _next(self) -> Decision | None:
         """Read the next record of the transcript, or the model's next answer."""
@@ -384,7 +375,6 @@ class ModelPolicy(Observer):
         after = self._rooms.env.counters()["rules"]
         fired = {name: count - self._fired.get(name, 0) for name, count in after.items()}
         self.played.append(self._conversation.played(fired))
-        self._is_over = True
         if self._progress is not None:
             self._progress(self.played[-1])
 
@@ -427,7 +417,7 @@ class Conversation:
         self._replies: list[list[tuple[str, str]]] = [[]]
         self._records = _records(path)
         self._last: tuple[str, str, list[ToolCall]] = "", "", []
-        self._is_full = False
+        self._is_full = self._appends = False
 
     def stored(self) -> dict[str, Any] | None:
         """The next record that the transcript holds already; None if there is none."""
@@ -494,7 +484,10 @@ class Conversation:
         record |= {"reasoning_tokens": usage.reasoning} if usage.reasoning else {}
         record |= {"estimated": True} if usage.estimated else {}
         record |= {"session": _SESSION, "time": datetime.now(UTC).isoformat(timespec="milliseconds")}
-        self._path.parent.mkdir(parents=True, exist_ok=True)
+        if not self._appends:  # before the first one, as reading changes nothing
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            _mend(self._path)
+            self._appends = True
         with open(self._path, "a", encoding="utf-8") as file:
             file.write(json.dumps(record, ensure_ascii=False) + "\n")
             file.flush()
@@ -502,7 +495,7 @@ class Conversation:
         return record
 
     def played(self, rules: Mapping[str, int]) -> PlayedEpisode:
-        """The episode as far as it was played, and how often rules fired."""
+        """The episode, which is over, and how often rules fired."""
         return PlayedEpisode(
             self._number,
             self._seat.result(),
@@ -512,7 +505,6 @@ class Conversation:
             self._usage,
             dict(self._stops),
             tuple(self._seat.answered),
-            self._seat.question is not None,
         )
 
     def take(self, record: Mapping[str, Any]) -> Decision | None:

@@ -444,8 +444,12 @@ def test_a_failure_loses_nothing_and_the_same_command_goes_on(tmp_path: Path, ca
     assert "the same command goes on" in error
     assert not (tmp_path / "talkitout" / "result.json").exists()
     # A line that was being written when the power went.
-    with open(tmp_path / "talkitout/transcripts/episode-001.jsonl", "a", encoding="utf-8") as file:
+    torn = tmp_path / "talkitout/transcripts/episode-001.jsonl"
+    with open(torn, "a", encoding="utf-8") as file:
         file.write('{"reply": "Act: le')
+    content = torn.read_bytes()
+    assert main(["replay", str(tmp_path / "talkitout"), "-o", str(tmp_path / "page.html")]) == 0
+    assert torn.read_bytes() == content, "who reads changes nothing"
 
     settings = tmp_path / "talkitout/transcripts/settings.json"
     with endpoint(lambda _: "Act: left") as stub:
@@ -466,6 +470,18 @@ def test_a_budget_is_kept_to_and_can_be_added_to(tmp_path: Path, capsys: Capture
         assert len(stub.requests) == 150 + 100
         assert evaluate(stub.url, tmp_path) == 0
     assert figures(tmp_path)["eval"]["replies"] == 300
+
+
+def test_a_spent_budget_counts_every_episode_that_is_over(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path, on="dance") == 0
+        first = tmp_path / "dance/transcripts/episode-000.jsonl"
+        first.write_text("".join(first.read_text().splitlines(keepends=True)[:-2]))
+        capsys.readouterr()
+        asked = len(stub.requests)
+        assert evaluate(stub.url, tmp_path, "--budget", "1", on="dance") == 4
+        assert len(stub.requests) == asked + 1
+    assert "2 of 3 episodes are over" in capsys.readouterr().err
 
 
 def test_other_settings_need_another_folder(tmp_path: Path, capsys: Capture) -> None:

@@ -143,6 +143,26 @@ def test_play_stops_where_a_policy_has_nothing_more_to_do() -> None:
     assert (log.steps, len(kept.played[0]), rooms.running.tolist()) == (3, 3, [True])
 
 
+def test_results_are_those_of_episodes_that_ended() -> None:
+    """A policy that stops playing has no result, rather than a failure for what it left."""
+
+    class Stops(Still):
+        def __init__(self, how: type[Exception]) -> None:
+            super().__init__()
+            self.how = how
+
+        def act(self, observation: Any) -> Any:
+            if self.forgotten[-1] == 1:
+                raise self.how
+            return super().act(observation)
+
+    for how, left in ((EpisodeOver, 1), (PolicyDone, 2)):
+        with pytest.raises(
+            ValueError, match=f"it stopped playing before the end of {left} of the 3 episodes"
+        ):
+            evaluate_policy(Stops(how), envs(1), 3)
+
+
 def test_play_stops_when_it_is_told() -> None:
     log = Log()
     play(Rooms(envs(2), [log]), {AGENT: Still()}, TestEpisodes(2), lambda: log.steps >= 10)
@@ -218,9 +238,11 @@ def test_steps_are_taken_back_chance_included() -> None:
 
     stage = Stage(sd.make("talkitout"))
     stage.begin({"seed": 4})
+    before = stage.info
     first = following(stage, 3)
     while stage.back():
         pass
+    assert stage.info is before
     assert (stage.steps, following(stage, 3)) == (0, first)
 
 

@@ -85,7 +85,7 @@ def test_by_default_a_request_holds_all_that_was_seen_and_heard(name: str, tmp_p
     policy = players.ModelPolicy(seat, players.Manner(), lambda number: tmp_path / "transcript.jsonl", ask)
     at_once(play_async(Rooms(sd.make(name), [policy]), {AGENT: policy}, TestEpisodes(1)))
     (played,) = policy.played
-    assert played.ended
+    assert played.result.ending
     assert len(told) == len(played.actions) + 1 > 1
 
 
