@@ -3,7 +3,7 @@
 import argparse
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final
 
 from socialai_dsl.baselines import MOST_EPISODES
@@ -47,9 +47,9 @@ def add_tell(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def tell_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What was typed of these, as `brief` takes it."""
-    given = {name: getattr(arguments, name) for name in TELL_OPTIONS}
+def typed_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[str, Any]:
+    """Which of these options were typed; one that was not is None."""
+    given = {name: getattr(arguments, name) for name in names}
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -12,22 +12,21 @@ from socialai_dsl.cli.arguments import (
     identifier,
     natural,
     positive,
-    refuse,
     seed,
-    tell_options,
+    typed_options,
 )
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options, model_options
+from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options
 from socialai_dsl.cli.terminal import json_text
-from socialai_dsl.episodes.players import MODEL_PREFIX
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.runs.evaluate import RECORDED, evaluate_each, made_player, result_of
 from socialai_dsl.runs.folder import EVALUATIONS, REPLAY, RESULT
-from trainer.config import UNTRAINED
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
+
+_OPTIONS: Final = ("greedy", "seed", "device", "net", "participant", "view", *TELL_OPTIONS, *MODEL_OPTIONS)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,8 +109,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
     if agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
-    _refuse_what_does_not_apply(arguments)
-    player = made_player(agent, scenarios, _options(arguments), out, arguments.participant)
+    player = made_player(agent, scenarios, typed_options(arguments, _OPTIONS), out)
     recorded = RECORDED if arguments.record is None else arguments.record
     results = []
     for evaluation in evaluate_each(player, scenarios, arguments.episodes, recorded, out, arguments.trials):
@@ -126,29 +124,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if arguments.json:
         print(json_text(results))
     return Exit.GOOD
-
-
-def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
-    """Refuse, by name, what the agent would ignore."""
-    agent = arguments.run
-    names = {"greedy", "seed", "device", "net", "participant", "view", *TELL_OPTIONS, *MODEL_OPTIONS}
-    if agent.startswith(MODEL_PREFIX):
-        names -= {*TELL_OPTIONS, *MODEL_OPTIONS}
-    elif agent in UNTRAINED:
-        names -= {"random": {"seed"}, "human": {"participant", "view", *TELL_OPTIONS}}.get(agent, set())
-    else:
-        names -= {"greedy", "seed", "device", "net"}
-    refuse(arguments, names, f"the agent {agent!r} has no use for it")
-
-
-def _options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What was typed of the options of the agent."""
-    told = tell_options(arguments)
-    if arguments.run.startswith(MODEL_PREFIX):
-        return model_options(arguments) | told
-    names = ("view",) if arguments.run == "human" else ("greedy", "seed", "device", "net")
-    given = told | {name: getattr(arguments, name) for name in names}
-    return {name: value for name, value in given.items() if value is not None}
 
 
 def _table(evaluation: Evaluation, figures: dict[str, Any]) -> str:

@@ -2,11 +2,10 @@
 
 import argparse
 from dataclasses import fields
-from typing import Any, Final
+from typing import Final
 
 from socialai_dsl.cli.arguments import STYLE, at_once, number_between, positive, seconds
 from socialai_dsl.episodes.players import ModelOptions
-from socialai_dsl.errors import UsageError
 
 MODEL_OPTIONS: Final = tuple(field.name for field in fields(ModelOptions))
 
@@ -83,13 +82,3 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="IN,OUT",
         help="US dollars for a million tokens of requests and a million of replies",
     )
-
-
-def model_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What was typed of `ModelOptions`."""
-    if arguments.grammar and arguments.mode not in (None, "text"):
-        raise UsageError(
-            f"--grammar: replies of --mode {arguments.mode} have a form already; it is for --mode text"
-        )
-    given = {name: getattr(arguments, name) for name in MODEL_OPTIONS}
-    return {name: value for name, value in given.items() if value is not None}

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import socialai_dsl
 from socialai_dsl.checking.briefing import brief
-from socialai_dsl.cli.arguments import add_tell, identifier, seed, tell_options
+from socialai_dsl.cli.arguments import TELL_OPTIONS, add_tell, identifier, seed, typed_options
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.episodes.players import HUMAN_FOLDER, session_folder
@@ -54,7 +54,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Play episode after episode until the player quits."""
     from socialai_dsl.play import play
 
-    briefing = brief(socialai_dsl.load(arguments.scenario), **tell_options(arguments))
+    briefing = brief(socialai_dsl.load(arguments.scenario), **typed_options(arguments, TELL_OPTIONS))
     name = scenario_folder_name(arguments.scenario)
     session = session_folder(arguments.out, arguments.participant)
 

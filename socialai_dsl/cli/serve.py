@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from typing import Final
 
 from socialai_dsl.checking.briefing import brief
-from socialai_dsl.cli.arguments import STYLE, add_tell, port, positive, seconds, tell_options
+from socialai_dsl.cli.arguments import STYLE, TELL_OPTIONS, add_tell, port, positive, seconds, typed_options
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -64,7 +64,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
     loaded = socialai_dsl.load(arguments.scenario)
     program = socialai_dsl.compile(loaded)
-    briefing = brief(loaded, **tell_options(arguments))
+    briefing = brief(loaded, **typed_options(arguments, TELL_OPTIONS))
     import uvicorn
 
     from socialai_dsl.llm.gate import IDLE, MOST_BYTES

@@ -48,6 +48,9 @@ class ModelOptions:
         timeout: seconds for one reply.
         budget: what may be spent: `200000 tokens`, or `2.50usd` with prices.
         prices: US dollars for a million tokens of requests and of replies: `0.15,0.60`.
+
+    Raises:
+        OptionError: replies are to be held to a grammar that have a form already.
     """
 
     base_url: str | None = None
@@ -64,6 +67,12 @@ class ModelOptions:
     timeout: float = 120.0
     budget: str | None = None
     prices: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.grammar and self.mode != "text":
+            raise OptionError(
+                "grammar", f"replies of the mode {self.mode} have a form already; expected text"
+            )
 
 
 @dataclass(frozen=True)

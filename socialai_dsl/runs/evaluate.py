@@ -46,7 +46,13 @@ from trainer.config import RunConfig
 _PLAYER: Final = ("greedy", "seed", "device", "net")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))
 _TOLD: Final = ("tell", "goal", "language")
-_OF_OTHERS: Final[dict[str, tuple[str, ...]]] = {"random": ("seed",), "human": ("view", *_TOLD)}
+_OF_KINDS: Final[dict[str, tuple[str, ...]]] = {
+    "network": _PLAYER,
+    "script": (),
+    "chance": ("seed",),
+    "model": (*_MODEL, *_TOLD),
+    "person": ("view", "participant", *_TOLD),
+}
 RECORDED: Final = 3
 """The number of successes, and of failures, that an evaluation films."""
 
@@ -75,8 +81,8 @@ def evaluate(
         trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
             that they show what can be learnt within a session. A person remembers all of a session in any case.
         options: of a trained agent `greedy`, `seed`, `device` and `net`, of `random` the `seed`; of a language model
-            those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`, see `Player`,
-            and of a person `view`.
+            those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`, see `Player`;
+            of a person `view`, and `participant`, with which the name of the session's folder begins.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -153,7 +159,6 @@ def made_player(
     scenarios: Sequence[str],
     options: Mapping[str, Any],
     out: Path | None,
-    who: str | None = None,
 ) -> Player:
     """Who plays, and how.
 
@@ -162,10 +167,10 @@ def made_player(
         scenarios: what is played; of none, that of the agent's run.
         options: see `evaluate`.
         out: where what a language model or a person plays is kept.
-        who: begins the name of the folder of a person's session.
 
     Raises:
-        ValueError: an option that this agent does not have; or see `evaluate`.
+        OptionError: this agent has no use for an option.
+        ValueError: an option that no agent has; or see `evaluate`.
     """
     if isinstance(agent, Player):
         refuse_unknown("evaluate", options, (), "; a Player has them itself")
@@ -174,15 +179,17 @@ def made_player(
         refuse_unknown("evaluate", options, (), "; what you hand over plays as it is")
         return player_of(agent, scenarios[0] if scenarios else "")
     player = Player(str(agent), out=out)
-    known = (*_MODEL, *_TOLD) if player.is_model else _OF_OTHERS.get(player.agent, ())
-    known = _PLAYER if player.is_trained else known
-    refuse_unknown(f"the agent {player.agent!r}", {k: v for k, v in options.items() if k not in known}, known)
+    known, every = _OF_KINDS[player.kind], {name for names in _OF_KINDS.values() for name in names}
+    refuse_unknown("evaluate", {k: v for k, v in options.items() if k not in every}, known)
+    for name in sorted(options.keys() - set(known)):
+        raise OptionError(name, f"the agent {player.agent!r} has no use for it")
     if player.is_model:
         told = {name: value for name, value in options.items() if name in _TOLD}
         asked = {name: value for name, value in options.items() if name not in _TOLD}
         return replace(player, options=ModelOptions(**asked), **told)
     if player.is_person:
-        return replace(player, out=session_folder(out or HUMAN_FOLDER, who), **options)
+        seen = {name: value for name, value in options.items() if name != "participant"}
+        return replace(player, out=session_folder(out or HUMAN_FOLDER, options.get("participant")), **seen)
     if not player.is_trained:
         return replace(player, **options)
     require_trainer()

@@ -22,7 +22,7 @@ pytest.importorskip("torch", reason="trained agents need the extra train")
 EPISODES = 4
 
 
-def a_person_who_gives_up_at_once(
+def a_person_who_walks_on(
     scenario: str,
     episodes: Callable[[int], tuple[str, dict[str, Any]] | None],
     folder: Path,
@@ -52,10 +52,13 @@ def a_person_who_gives_up_at_once(
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Kind of mind -> the folder of its evaluation on Dance."""
     place = tmp_path_factory.mktemp("minds")
-    own = lambda seen: np.tile([2, 0, 0, 0], (len(seen["tokens"]), 1))  # noqa: E731
+
+    def own(seen: Any) -> Any:
+        return np.tile([2, 0, 0, 0], (len(seen["tokens"]), 1))
+
     with pytest.MonkeyPatch.context() as patch, endpoint(lambda request: "Act: left") as stub:
         patch.setenv("OPENAI_API_KEY", "none")
-        patch.setattr("socialai_dsl.play.play", a_person_who_gives_up_at_once)
+        patch.setattr("socialai_dsl.play.play", a_person_who_walks_on)
         played = [
             sd.evaluate("oracle", "dance", EPISODES, out=place / "script"),
             sd.evaluate("random", "dance", EPISODES, out=place / "chance"),
@@ -100,3 +103,14 @@ def test_one_report_joins_all_of_them_by_room(folders: dict[str, Path], tmp_path
     assert (pairs.rooms == EPISODES).all()
     for kind in folders:
         assert f">{kind}<" in text
+
+
+@pytest.mark.parametrize("agent", ["oracle", "random", "human", "llm:stub", "shipped:dance"])
+def test_what_a_mind_would_ignore_is_refused_by_name(agent: str) -> None:
+    options = {"greedy": True, "style": "json", "view": "room"}
+    own = {"human": "view", "llm:stub": "style", "shipped:dance": "greedy"}.get(agent)
+    for name in options.keys() - {own}:
+        with pytest.raises(ValueError, match=f"{name}: the agent '{agent}' has no use for it"):
+            sd.evaluate(agent, "dance", 1, **{name: options[name]})
+    with pytest.raises(ValueError, match="greed: got True, but evaluate has no such option"):
+        sd.evaluate(agent, "dance", 1, greed=True)
