@@ -120,7 +120,7 @@ class Watch:
         self._keys[:] = self._table.state.keys
 
     def tally(self, episodes: int) -> Tally:
-        """The counts so far, of so many episodes that are over."""
+        """The counts so far; `episodes` of them are over."""
         times: Counter[TallyItem] = Counter()
         endings: Counter[str] = Counter()
         counters = self._table.batch.counters

@@ -74,6 +74,21 @@ class ModelOptions:
                 "grammar", f"replies of the mode {self.mode} have a form already; expected text"
             )
 
+    @property
+    def manner(self) -> str:
+        """How a model is shown the world and answers, in a phrase, with all else that can change what it does."""
+        history = self.history
+        shown = "the whole episode" if history is None else f"{history} observation{'s' * (history > 1)}"
+        further = {
+            "temperature": self.temperature,
+            "max tokens": self.max_tokens,
+            "on invalid": None if self.on_invalid == "noop" else self.on_invalid,
+            "probes": "kept" if self.probes == "kept" else None,
+            "held to": "a grammar" if self.grammar else None,
+        }
+        parts = [f"{name} {value}" for name, value in further.items() if value is not None]
+        return ", ".join([f"{self.style} and {self.mode}", shown, *parts])
+
 
 @dataclass(frozen=True)
 class Player:
@@ -172,9 +187,7 @@ class Player:
     def manner(self) -> str:
         """How actions come about, in a phrase; empty where there is nothing to say."""
         if self.options is not None:
-            history = self.options.history
-            shown = "the whole episode" if history is None else f"{history} observation{'s' * (history > 1)}"
-            return f"{self.options.style} and {self.options.mode}, {shown}"
+            return self.options.manner
         if self.agent in ("oracle", "human") or self.policy is not None:
             return ""
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"

@@ -275,7 +275,7 @@ def evaluate_policy(
         envs: a vector environment with `autoreset_mode="Disabled"`, which plays and counts the test episodes alone.
         episodes: N, at least the number of environments; the common test set has 500.
         observers: watch as well.
-        trials: how many episodes in a row the policy remembers; it is reset before each session of so many.
+        trials: how many episodes in a row the policy remembers; it is reset before each session of that many.
 
     Raises:
         ValueError: `episodes` is less than 1 or than the number of environments, or these reset themselves; or the

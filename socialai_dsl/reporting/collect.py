@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
+from socialai_dsl.episodes.players import ModelOptions
 from socialai_dsl.experiments.folder import RUNS
 from socialai_dsl.experiments.folder import read_experiment as read_document
 from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, RunEntry
@@ -203,12 +204,19 @@ def _column(settings: Mapping[str, Any]) -> str:
 
 
 def _granted(result: ResultRecord | None) -> Iterator[str]:
-    """What was granted to a player, which makes another condition; a person's session is as long as it is."""
+    """What makes another condition of a player: what it was told and saw, and how its actions came about.
+
+    A person's session is as long as it is.
+    """
     if result is not None:
-        if result.tell != "nothing":
-            yield f"told {'a goal' if result.tell == 'goal' else result.tell}"
+        if result.tell == "goal":
+            yield f'told "{result.told}"' if isinstance(result.told, str) and result.told else "told a goal"
+        elif result.tell != "nothing":
+            yield f"told {result.tell}" + (f" ({result.language})" if result.language else "")
         if result.view != "seat":
             yield f"sees the {result.view}"
+        if result.greedy or (result.kind == "model" and result.eval.actions != ModelOptions().manner):
+            yield result.eval.actions
         if result.trials > 1 and result.kind != "person":
             yield f"{result.trials} trials"
 

@@ -40,6 +40,7 @@ class Figures(Record):
     """What came of the test episodes: the object `eval` of a result.
 
     Attributes:
+        actions: how they came about, in a phrase.
         trials: in order, where players remembered several episodes in a row.
         replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
             `cost` in US dollars, None where prices are not known.
@@ -49,6 +50,7 @@ class Figures(Record):
     success_rate: float = Field(ge=0, le=1)
     mean_length: float
     mean_return: float
+    actions: str = ""
     outcomes: dict[str, float] = Field(default_factory=dict)
     endings: list[EndingRecord] = Field(default_factory=list)
     rules: dict[str, float] = Field(default_factory=dict)
@@ -67,13 +69,17 @@ class ResultRecord(Record):
 
     Attributes:
         kind: of mind: network, script, chance, model, person or policy; empty where an older version wrote it.
-        tell, told: what the player was told of the task, by member of a suite if they differ. view: what it saw.
+        greedy: whether a network took its most probable actions.
+        tell, told: what the player was told of the task, by member of a suite if they differ. language: of that, where
+            the file says it. view: what the player saw.
         trials: how many episodes in a row it remembered.
     """
 
     kind: str = ""
+    greedy: bool = False
     tell: str = "nothing"
     told: str | dict[str, str] = ""
+    language: str = ""
     view: str = "seat"
     trials: int = Field(1, ge=1)
     frames: int = 0

@@ -48,12 +48,12 @@ def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label
         episode.save_film(place / f"{name}.gif")
     if traces := evaluation.traces(replayed):
         write_text(place / REPLAY, replay_page(traces))
-    write_text(place / EPISODES, _episodes(evaluation))
+    write_text(place / EPISODES, episodes_table(evaluation))
     return place
 
 
-def _episodes(evaluation: Evaluation) -> str:
-    """One line for each test episode."""
+def episodes_table(evaluation: Evaluation) -> str:
+    """A table in CSV with a line for each test episode."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("episode", "success", "outcome", "length", "return"))

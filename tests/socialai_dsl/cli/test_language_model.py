@@ -158,6 +158,8 @@ def test_a_request_holds_the_whole_episode_or_says_what_it_leaves_out(tmp_path: 
         "told": "Leave.",
         "view": "seat",
     }
+    manner = "prose and text, 3 observations, temperature 0.5, max tokens 50"
+    assert figures(tmp_path)["eval"]["actions"] == manner
     assert last["messages"][2]["content"] == "Act: left"
     lines = sum(text.count("\n") + 1 for text in whole[1:-6:2])
     told = f"(97 earlier turns are left out here, {lines} lines of what you saw and heard.)\n\n"

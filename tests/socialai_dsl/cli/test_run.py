@@ -66,11 +66,14 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
         "model_card.md",
         "episode.gif",
         "episode.html",
+        "episodes.csv",
         "transcript.txt",
         "result.json",
         "scenario",
     }
     result = result_of(str(run))
+    ended = [line.split(",")[1] for line in (run / "episodes.csv").read_text().splitlines()[1:]]
+    assert result["eval"]["success_rate"] == ended.count("1") / len(ended)
     assert set(result) == {
         "scenario",
         "agent",

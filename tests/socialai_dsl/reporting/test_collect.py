@@ -3,9 +3,11 @@
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from socialai_dsl.episodes.players import ModelOptions
 from socialai_dsl.reporting.collect import RunRecord, read_experiment, read_runs
 from socialai_dsl.runs.lock import hold
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
@@ -151,16 +153,26 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
     ("granted", "column"),
     [
         ({"tell": "instructions", "told": "Find the exit."}, "ppo, told instructions"),
+        ({"tell": "instructions", "told": "Raus!", "language": "de"}, "ppo, told instructions (de)"),
         ({"tell": "goal"}, "ppo, told a goal"),
+        ({"tell": "goal", "told": "Get out."}, 'ppo, told "Get out."'),
+        ({"tell": "goal", "told": "Wait."}, 'ppo, told "Wait."'),
+        ({"greedy": True, "eval": {"actions": "most probable actions"}}, "ppo, most probable actions"),
+        ({"kind": "model", "eval": {"actions": ModelOptions().manner}}, "ppo"),
+        (
+            {"kind": "model", "eval": {"actions": "grid and text, 2 observations"}},
+            "ppo, grid and text, 2 observations",
+        ),
         ({"view": "room"}, "ppo, sees the room"),
         ({"trials": 3}, "ppo, 3 trials"),
         ({"trials": 3, "kind": "person"}, "ppo"),
     ],
 )
 def test_what_a_player_is_granted_makes_another_condition(
-    tmp_path: Path, granted: dict[str, object], column: str
+    tmp_path: Path, granted: dict[str, Any], column: str
 ) -> None:
     folders = [write_run(tmp_path / name, "help", 0, 0.5) for name in ("a", "b")]
     result = json.loads((tmp_path / "b" / "result.json").read_text())
-    (tmp_path / "b" / "result.json").write_text(json.dumps(result | granted))
+    figures = result["eval"] | granted.get("eval", {})
+    (tmp_path / "b" / "result.json").write_text(json.dumps(result | granted | {"eval": figures}))
     assert {c.entry.column for c in read_runs(folders).conditions} == {"ppo", column}
