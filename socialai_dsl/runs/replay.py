@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.players import Agent, Player, folder_of, player_of
+from socialai_dsl.episodes.players import Agent, Player, folder_of, named_agent
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError, first_mistake
 from socialai_dsl.evaluation.test_set import (
@@ -141,15 +141,12 @@ def _evaluation(source: str, agent: Agent | None, episodes: int, greedy: bool) -
 
 
 def _of_scenario(scenario: str, agent: Agent, episodes: int, greedy: bool) -> Evaluation:
-    player = player_of(agent, scenario)
+    named = named_agent(str(agent), scenario) if isinstance(agent, str | Path) else agent
+    player = made_player(named, [scenario], {"greedy": True} if greedy else {}, None)
     if player.is_person or player.is_model:
         raise OptionError(
             "agent",
             f"got {player.agent!r}, who plays for `socialai evaluate`; what that writes is replayed by its folder",
         )
-    if greedy and not player.is_trained:
-        raise OptionError("greedy", f"the agent {player.agent!r} has no use for it")
-    if player.is_trained and isinstance(agent, str | Path):
-        player = made_player(player.agent, [scenario], {"greedy": greedy}, None)
     loaded = load(scenario)
     return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
