@@ -32,11 +32,11 @@ def check_speakers(resolver: Resolver, spoken: Spoken) -> None:
                     findings.error("S405", message, findings.at(path), hint=hint)
     tone = symbols.scenario.observe.tone
     look = symbols.scenario.looks.get(tone) if tone is not None else None
-    for line in _of_npcs(spoken) if look is not None else ():
+    if look is None:
+        return
+    for line in _of_npcs(spoken):
         begun = (re.match(r"\(([^()]*)\)", composed(text)) for text in texts_of(line))
-        said = next(
-            (one for one in begun if one is not None and look is not None and one[1] in look.words), None
-        )
+        said = next((one for one in begun if one is not None and one[1] in look.words), None)
         if said is not None:
             message = f"`{said[0]}` reads as the tone of what is said, which the look `{tone}` gives"
             findings.error("S405", message, line.span, hint="leave it out; the tone is heard anyway")
