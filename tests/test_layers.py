@@ -40,6 +40,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "atomic": ({"errors"}, set()),
     "baselines": (set(), set()),
     "errors": (set(), set()),
+    "model_options": ({"errors"}, set()),
     "runs.lock": (set(), {"filelock"}),
     "runs.status": ({"atomic", "errors"}, set()),
     "runs.versions": (set(), set()),
@@ -85,7 +86,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "pydantic", "PIL"},
     ),
     "episodes": (
-        TEXT_SIDE | {"errors", "program", "program_suite", "envs", "render", "traces"},
+        TEXT_SIDE | {"errors", "model_options", "program", "program_suite", "envs", "render", "traces"},
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (
@@ -96,7 +97,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "evaluation": (
         TEXT_SIDE
-        | {"errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
+        | {"errors", "atomic", "baselines", "model_options"}
+        | {"program", "program_suite", "compilation", "envs", "analysis"}
         | {"episodes", "traces", "llm", "play", "experiments", "runs.folder", "runs.versions"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
@@ -111,7 +113,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "runs": (
         TEXT_SIDE
         | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "traces", "evaluation"}
-        | {"baselines", "experiments", "reporting", "runs.folder", "runs.options", "runs.versions"},
+        | {"baselines", "experiments", "model_options", "reporting"}
+        | {"runs.folder", "runs.options", "runs.versions"},
         {"pydantic", "yaml", "trainer"},
     ),
     "experiments": (
@@ -120,7 +123,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"pydantic", "ray", "submitit", "yaml", CONFIG, FILES, SHIPPED},
     ),
     "reporting": (
-        {"errors", "experiments", "baselines", "runs.folder"},
+        {"errors", "experiments", "baselines", "model_options", "runs.folder"},
         {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),

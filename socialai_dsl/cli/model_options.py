@@ -5,7 +5,7 @@ from dataclasses import fields
 from typing import Final
 
 from socialai_dsl.cli.arguments import STYLE, at_once, number_between, positive, seconds
-from socialai_dsl.episodes.players import ModelOptions
+from socialai_dsl.model_options import ModelOptions
 
 MODEL_OPTIONS: Final = tuple(field.name for field in fields(ModelOptions))
 

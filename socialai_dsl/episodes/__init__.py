@@ -21,7 +21,7 @@ from socialai_dsl.episodes.play import (
     play,
     play_async,
 )
-from socialai_dsl.episodes.players import ModelOptions, Player
+from socialai_dsl.episodes.players import Player
 from socialai_dsl.episodes.policies import (
     EpisodeOver,
     FunctionPolicy,
@@ -38,6 +38,7 @@ from socialai_dsl.episodes.policies import (
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
 from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.episodes.traces import Tracing, trace_of
+from socialai_dsl.model_options import ModelOptions
 
 __all__ = [
     "AGENT",

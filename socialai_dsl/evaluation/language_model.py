@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import Briefing
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Asker, probe_names
-from socialai_dsl.episodes.players import MODEL_PREFIX, ModelOptions
+from socialai_dsl.episodes.players import MODEL_PREFIX
 from socialai_dsl.episodes.results import EvalResult
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.questions import score
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces.endings import Ending

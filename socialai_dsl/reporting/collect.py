@@ -17,10 +17,10 @@ from typing import Any, Final, TypeVar
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-from socialai_dsl.episodes.players import ModelOptions
 from socialai_dsl.experiments.folder import RUNS
 from socialai_dsl.experiments.folder import read_experiment as read_document
 from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, RunEntry
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.records import (
     Figures,
     ResultRecord,

@@ -15,7 +15,6 @@ from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
     Agent,
-    ModelOptions,
     Player,
     folder_of,
     named_agent,
@@ -26,6 +25,7 @@ from socialai_dsl.episodes.players import (
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
 from socialai_dsl.frontend import load
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.copies import keep_scenario
 from socialai_dsl.runs.folder import (
     CONFIG,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.episodes.players import ModelOptions
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.collect import RunRecord, read_experiment, read_runs
 from socialai_dsl.runs.lock import hold
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
