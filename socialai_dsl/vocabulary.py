@@ -115,6 +115,11 @@ def tokens(text: str, telling: Container[str]) -> list[str]:
     return [token for piece in pieces(text) for token in ([piece] if piece in telling else words(piece))]
 
 
+def mark_of(speaker: str | None) -> str:
+    """What a marked line begins with: whose line it is, None where names are hidden. No word of a text looks so."""
+    return f"<{'line' if speaker is None else speaker}>"
+
+
 def _shared(rows: Iterable[Sequence[str]]) -> int:
     """How many entries all rows begin with."""
     columns = (set(column) for column in zip(*rows, strict=False))

@@ -2115,6 +2115,22 @@ def test_9_5_the_history_has_all_lines(play: Folder) -> None:
     assert run.steps(3).info["history"] == "Ann: I am Ann.\nAnn: I am Ann."
 
 
+def test_9_8_marked_lines(play: Folder) -> None:
+    text = """
+        observe: {{lines: {}, names: {}, own_voice: true}}
+        frames: {{talk: {{states: {{s: {{then: [{{say: Ann says hello}}]}}}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: talk}}}}
+    """
+    for names, marks in (("shown", ["<Agent>", "<Ann>"]), ("hidden", ["<line>", "<line>"])):
+        run = play(text.format("marked", names)).step(None, "Say bye")
+        words = run.env.unwrapped.program.vocabulary  # type: ignore[attr-defined]
+        heard = [words[token] for token in run.observation["tokens"] if token]
+        assert heard == [marks[0], "say", "bye", marks[1], "ann", "says", "hello"]
+        plain = play(text.format("plain", names)).step(None, "Say bye")
+        assert run.info["utterance"] == plain.info["utterance"]
+        assert not {*marks} & {*plain.env.unwrapped.program.vocabulary}  # type: ignore[attr-defined]
+
+
 def test_9_6_lines_without_names(play: Folder) -> None:
     run = play("""
         observe: {names: hidden}

@@ -170,6 +170,7 @@ SPOKEN_OF = (
         "pointing_right",
         "egocentric",
         "own_voice: true",
+        "lines: marked",
         "reward:",
         "each_step:",
         "would_see(",

@@ -39,7 +39,7 @@ from socialai_dsl.program import Field, Op, Register, constant, is_temporary
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
-from socialai_dsl.vocabulary import normal, telling_pieces, tokens, words
+from socialai_dsl.vocabulary import mark_of, normal, telling_pieces, tokens, words
 from socialai_dsl.widths import UNSPOKEN
 
 _TESTS = {
@@ -432,6 +432,9 @@ class Lines:
 
     def __post_init__(self) -> None:
         self._known: dict[tuple[int, tuple[str | Term, ...], Term | None], int] = {}
+        self._marked: dict[
+            int, tuple[str, str]
+        ] = {}  # where lines are marked, the mark of each and what follows it
         self.grammar = self.checked.sentences.by_number()
         if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
             self._add_agent()
@@ -449,10 +452,13 @@ class Lines:
         *before, name = pieces[: len(_before(speaker))]
         tone = "".join(f"({word}) " for word in before)
         text = "".join(pieces[1 + len(before) :])
-        name = f"{name} to {to[1]}" if to else name
-        heard = f"{name}: {tone}{text}" if self.checked.names_shown else f"{tone}{text}"
+        called, name = name, f"{name} to {to[1]}" if to else name
+        shown = self.checked.names_shown
         line = len(self.texts)
-        self.texts.append(heard)
+        self.texts.append(f"{name}: {tone}{text}" if shown else f"{tone}{text}")
+        if self.checked.lines_marked:
+            rest = f"to {to[1]}: {tone}{text}" if to and shown else f"{tone}{text}"
+            self._marked[line] = mark_of(called if shown else None), rest
         self.classes.append(self.classes_of.of_text(text, to[0] if to else None))
         if to and to[0] != 0 and not self.checked.overheard:
             self.kept_secret.add(line)
@@ -471,7 +477,7 @@ class Lines:
     def adopt(self, other: Lines) -> None:
         """Number all lines as `other` does, which was made for the same scenario."""
         self.texts, self.classes, self.nouns = [*other.texts], [*other.classes], [*other.nouns]
-        self._known = dict(other._known)
+        self._known, self._marked = dict(other._known), dict(other._marked)
         self.kept_secret = set(other.kept_secret)
         self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
 
@@ -642,16 +648,25 @@ class Lines:
     def tokens(self) -> list[list[int]]:
         """The ids of the words of each line, once all lines are known."""
         ids = {word: number for number, word in enumerate(self.vocabulary)}
-        said = (tokens(text, self._telling) if self._telling else words(text) for text in self.texts)
         # A text without a single word still has to be heard as something.
-        return [[ids.get(word, UNKNOWN) for word in line] or [UNKNOWN] for line in said]
+        return [
+            [ids.get(word, UNKNOWN) for word in self._read(line)] or [UNKNOWN]
+            for line in range(len(self.texts))
+        ]
+
+    def _read(self, line: int) -> list[str]:
+        """A line as its tokens spell it."""
+        mark, text = self._marked.get(line, (None, self.texts[line]))
+        said = tokens(text, self._telling) if self._telling else words(text)
+        return said if mark is None else [mark, *said]
 
     @cached_property
     def _telling(self) -> list[str]:
         """What tells the lines apart that the agent can hear, and the names of who says them."""
         heard = set().union(*(self.speakers[speaker] for speaker in self._heard_speakers)) - self.kept_secret
-        lines = [self.texts[line] for line in sorted(heard)]
-        names = [line.partition(":")[0] for line in lines] if self.checked.names_shown else []
+        lines = [self._marked.get(line, ("", self.texts[line]))[1] for line in sorted(heard)]
+        called = self.checked.names_shown and not self.checked.lines_marked
+        names = [line.partition(":")[0] for line in lines] if called else []
         return telling_pieces([*names, *lines])
 
     @property

@@ -510,6 +510,10 @@ class Observe(Model):
     )
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
+    lines: Literal["plain", "marked"] = Field(
+        "plain",
+        description="marked: each line in `tokens` begins with a mark of who says it, `<Ann>`, which is no word",
+    )
     own_voice: bool = Field(False, description="whether the agent hears itself")
     channels: ListOf[Channel | Word] | None = Field(
         None,

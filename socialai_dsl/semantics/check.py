@@ -46,6 +46,7 @@ from socialai_dsl.semantics.resolver import (
     Resolver,
     number_of_texts,
     texts_of,
+    words_of_values,
 )
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -67,7 +68,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.texts import texts_in_order
 from socialai_dsl.source import DataPath, Node, Span
-from socialai_dsl.vocabulary import PRIMITIVES, pieces
+from socialai_dsl.vocabulary import PRIMITIVES, mark_of, pieces
 from socialai_dsl.vocabulary import words as words_of
 from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
 
@@ -395,6 +396,10 @@ class _Run:
         for text in texts:
             words |= dict.fromkeys(words_of(text))
             written.update(pieces(text))
+        if scenario.observe.lines == "marked":
+            shown = scenario.observe.names == "shown"
+            called = [word for name in names for word in words_of_values(name.type)] if shown else [None]
+            words |= dict.fromkeys(map(mark_of, called))
         if len(written | words.keys()) + len(UNSPOKEN) > MOST_WORDS:
             most = MOST_WORDS - len(UNSPOKEN)
             message = f"its texts have {len(words):,} words in {len(written):,} spellings; {most:,} can be told apart"
@@ -423,6 +428,7 @@ class _Run:
             rules=rules,
             require=required,
             egocentric=scenario.observe.directions == "egocentric",
+            lines_marked=scenario.observe.lines == "marked",
             slope=self._slope(),
             beliefs=believed,
             channels=self._channels(),

@@ -525,6 +525,7 @@ class CheckedScenario:
     rules: tuple[RulePlan, ...] = ()
     require: tuple[SitedTerm, ...] = ()
     egocentric: bool = False
+    lines_marked: bool = False
     beliefs: tuple[BeliefPlan, ...] = ()
     slope: int = 900
     each_step: int = 0

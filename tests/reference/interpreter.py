@@ -290,9 +290,18 @@ class Reference:
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
-        self.history += [self.vocabulary.heard(self.line(heard)) for heard in self.world.lines]
+        self.history += map(self.read, self.world.lines)
         while sum(map(len, self.history)) > self.vocabulary.length:
             self.history.pop(0)
+
+    def read(self, heard: Heard) -> list[str]:
+        """The words of a line, after a mark of who says it where lines are marked."""
+        line, mark = self.line(heard), []
+        if self.scenario.observe.lines == "marked":
+            hidden, name = self.scenario.observe.names == "hidden", heard.speaker.name
+            mark = ["<line>" if hidden else f"<{name}>"]
+            line = line if hidden else line.removeprefix(name).removeprefix(":").strip()
+        return [*mark, *self.vocabulary.heard(line)]
 
     def line(self, heard: Heard) -> str:
         """A line as it is heard: `Name: text`, `Name to Name: text`, or the text alone where names are hidden."""

@@ -263,6 +263,7 @@ class Observe:
     npcs: str = "shown"
     image: str = "end"
     names: str = "shown"
+    lines: str = "plain"
     directions: str = "absolute"
     own_voice: bool = False
     channels: tuple[str, ...] | None = None

@@ -55,6 +55,11 @@ class Vocabulary(Words):
         self.telling = telling_parts(self.lines())
         for part in sorted(self.telling):
             self.ids.setdefault(part, len(self.ids) + 2)
+        if scenario.observe.lines == "marked":
+            shown = scenario.observe.names == "shown"
+            called = [who for name in self.members for who in self.names_of(name)] if shown else ["line"]
+            for who in called:
+                self.ids.setdefault(f"<{who}>", len(self.ids) + 2)
         self.length = self.longest_history()
 
     def in_order_of_appearance(self) -> Iterator[str]:
@@ -84,7 +89,7 @@ class Vocabulary(Words):
                 continue
             texts = {text for who in self.who(name) for text in self.texts(who)}
             tones = [f"({word}) " for word in self.tones(name)] or [""]
-            if self.scenario.observe.names == "hidden":
+            if self.scenario.observe.names == "hidden" or self.scenario.observe.lines == "marked":
                 yield from (f"{tone}{text}" for tone, text in product(tones, texts))
             elif texts:
                 names = self.names_of(name)
@@ -442,6 +447,8 @@ class Vocabulary(Words):
 
     def longest_name(self, name: str) -> int:
         """The words before a member's lines; none where names are hidden."""
+        if self.scenario.observe.lines == "marked":
+            return 1
         if self.scenario.observe.names == "hidden":
             return 0
         return max(len(self.heard(text)) for text in self.names_of(name))

@@ -667,6 +667,8 @@ class _Author:
             made["names"] = "hidden"
         if self.often(0.25):
             made["own_voice"] = True
+        if self.often(0.2):
+            made["lines"] = "marked"
         if self.often(0.3):
             made["directions"] = "egocentric"
         if self.often(0.25):
