@@ -210,6 +210,7 @@ class Assembly:
             entities=self._names(),
             registers=(),
             lines=tuple(text for text, _, _ in self.lines),
+            line_speakers=(1,) * len(self.lines),
             outcome_table=tuple(
                 Outcome(name, name == "won") for name in ("won", "lost", "deadly", "timeout")
             ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +18,35 @@ _CODED_FRAMES = 40
 _SILENCE = 0  # what the environments' `utterance_ids` say when nothing was heard
 
 
+class BatchStep(NamedTuple):
+    """The step that E environments have just made.
+
+    Attributes:
+        envs: the vector environment after it, which knows what was heard.
+        image: uint8 (E, H, W, C), observed after it.
+        actions: int64 (E, heads), as played, by the agent or by a guide.
+        rewards: float64 (E,), the scenario's.
+        ended: bool (E,), true where it ended the episode; what is observed and heard is then of the next episode.
+        success: bool (E,), true where it ended the episode in success.
+        config: the run's options, with the present values of those that change during the run.
+        progress: share of the run's frames made before this rollout, 0 to 1.
+    """
+
+    envs: Any
+    image: NDArray[np.uint8]
+    actions: Int64
+    rewards: NDArray[np.float64]
+    ended: NDArray[np.bool_]
+    success: NDArray[np.bool_]
+    config: RunConfig
+    progress: float
+
+
 class Bonus(Protocol):
     """The interface of a bonus on the scenario's reward; `--bonus mine:Bonus` builds `Bonus(config, num_envs)`."""
 
-    def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The bonus of the step just made, float64 (E,).
-
-        Args:
-            envs: the vector environment, which knows the ids of what was heard.
-            image: uint8 (E, H, W, C), observed after the step.
-            ended: bool (E,), true where the step ended the episode; the observation is then the next episode's first.
-        """
+    def step(self, step: BatchStep) -> NDArray[np.float64]:
+        """The bonus of the step just made, float64 (E,)."""
 
     def state(self) -> dict[str, NDArray[np.generic]]:
         """Its whole state, as arrays by name."""
@@ -62,29 +80,28 @@ class EpisodicBonus:
         self._kind = config.bonus
         self._power = config.bonus_m
         self._as_coded = config.bonus_formula == "as_coded"
-        if self._as_coded:
-            self._unit, self._scale = config.bonus_c / _CODED_FRAMES, config.bonus_t
-        else:
-            self._unit, self._scale = config.bonus_c / config.bonus_t, 1.0
+        self._divisor = _CODED_FRAMES if self._as_coded else config.bonus_t
+        self._scale = config.bonus_t if self._as_coded else 1.0
         self.counts = np.zeros((num_envs, 0), np.int32)
         self.keys: dict[int, int] = {}
 
-    def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def step(self, step: BatchStep) -> NDArray[np.float64]:
         """See `Bonus.step`."""
         if self._kind == "lang":
-            keys = np.asarray(envs.utterance_ids())[:, None]
+            keys = np.asarray(step.envs.utterance_ids())[:, None]
             new = np.full(keys.shape, True) if self._as_coded else keys != _SILENCE
         else:
-            keys = np.sort(cell_codes(image), axis=1)
+            keys = np.sort(cell_codes(step.image), axis=1)
             new = np.ones(keys.shape, np.bool_)
             new[:, 1:] = keys[:, 1:] != keys[:, :-1]
         columns = self._columns(keys)
         rows = np.arange(len(keys))[:, None]
         visits = self.counts[rows, columns]
-        terms = np.where(new, self._unit / (visits + 1.0) ** self._power, 0.0)
-        bonus: NDArray[np.float64] = np.where(ended, 0.0, self._scale * np.tanh(terms.sum(axis=1)))
+        unit = step.config.bonus_c / self._divisor
+        terms = np.where(new, unit / (visits + 1.0) ** self._power, 0.0)
+        bonus: NDArray[np.float64] = np.where(step.ended, 0.0, self._scale * np.tanh(terms.sum(axis=1)))
         self.counts[np.broadcast_to(rows, keys.shape)[new], columns[new]] += 1
-        self.counts[ended] = 0
+        self.counts[step.ended] = 0
         return bonus
 
     def _columns(self, keys: Int64) -> Int64:

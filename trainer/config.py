@@ -9,15 +9,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, create_model, model_validator
 
 Role = Literal["flag", "hyper", "kept"]
 """Where an option is given: by a flag of its own, by `--hyper NAME=VALUE`, or nowhere (it follows from others)."""
 
 
-def _option(default: Any, about: str, *, role: Role = "hyper", result: bool = True, **bounds: Any) -> Any:
+def _option(
+    default: Any,
+    about: str,
+    *,
+    role: Role = "hyper",
+    result: bool = True,
+    scheduled: bool = False,
+    **bounds: Any,
+) -> Any:
     """Declare an option.
 
     Args:
@@ -25,13 +33,15 @@ def _option(default: Any, about: str, *, role: Role = "hyper", result: bool = Tr
         about: its help text.
         role: see `Role`.
         result: whether it decides what a run computes; False for options that say where, how long or how it is kept.
+        scheduled: whether it may change linearly during the run, to the option `NAME_end`, which is then made from it.
         bounds: pydantic's (`ge`, `gt`, `le`, `lt`).
     """
-    extra: dict[str, Any] = {"role": role, "result": result}
+    extra: dict[str, Any] = {"role": role, "result": result, "scheduled": scheduled}
     return Field(default, description=about, json_schema_extra=extra, **bounds)
 
 
 _flag = partial(_option, role="flag")
+_coefficient = partial(_option, scheduled=True)
 Name = Annotated[str, Field(min_length=1)]
 
 
@@ -40,22 +50,10 @@ MOST_FRAMES: Final = 10**15 - 1
 _MOST_IN_UPDATE: Final = 2**24
 
 
-class RunConfig(BaseModel):
-    """Every option of a run, resolved: there is no `auto`. Equal configurations and code compute equal runs.
-
-    Defaults marked "measured" were chosen by runs of this trainer. Those marked "paper" are in the appendix of the
-    SocialAI 1.0 paper on its baselines, or in the code released with it.
-
-    Raises:
-        ValueError: a value is out of bounds, or two values contradict each other (pydantic's ValidationError).
-    """
+class _Starts(BaseModel):
+    """Every option of a run but the ends of schedules, `RunConfig`'s other half."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    _place: Path = PrivateAttr(default_factory=Path)
-    """The run's folder, from which what it keeps is named; it is not part of the configuration, so it may move."""
-    _code: Path | None = PrivateAttr(None)
-    """Where code of one's own is loaded from, if not from the run's folder."""
 
     scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
     agent: Name = _flag(
@@ -90,7 +88,9 @@ class RunConfig(BaseModel):
         "mine:Guide",
     )
     guide_share: float = _option(0.5, "first share of the frames, led by the guide (measured)", ge=0, le=1)
-    imitation_coef: float = _option(1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0)
+    imitation_coef: float = _coefficient(
+        1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0
+    )
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1, le=65_536)
     bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
@@ -101,20 +101,18 @@ class RunConfig(BaseModel):
     )
     epochs: int = _option(4, "passes over each rollout (paper)", ge=1, le=1_000)
     minibatches: int = _option(4, "parts a rollout is cut into (measured)", ge=1)
-    lr: float = _option(7e-4, "Adam's learning rate at the start (measured; paper 1e-4)", gt=0)
-    lr_end: float | None = _option(None, "learning rate at the end, reached linearly; null: unchanged", gt=0)
+    lr: float = _coefficient(7e-4, "Adam's learning rate (measured; paper 1e-4)", gt=0)
     adam_eps: float = _option(1e-5, "Adam's epsilon (paper)", gt=0)
     adam_beta2: float = _option(0.999, "Adam's beta2, the decay of its mean of squared gradients", ge=0, lt=1)
-    gamma: float = _option(0.99, "discount per step (paper)", ge=0, le=1)
-    gae_lambda: float = _option(0.95, "lambda of the advantage estimates (measured; paper .99)", ge=0, le=1)
-    clip: float = _option(0.2, "PPO's clipping range of the probability ratio (paper)", gt=0)
-    clip_value: bool = _option(False, "clip the value's change by `clip` as well (paper: yes; measured: no)")
-    value_coef: float = _option(0.5, "weight of the squared value error (paper)", ge=0)
-    entropy_coef: float = _option(0.01, "weight of the entropy, nats, at the start (paper)", ge=0)
-    entropy_coef_end: float | None = _option(
-        None, "weight of the entropy at the end, reached linearly; null: unchanged", ge=0
+    gamma: float = _coefficient(0.99, "discount per step (paper)", ge=0, le=1)
+    gae_lambda: float = _coefficient(
+        0.95, "lambda of the advantage estimates (measured; paper .99)", ge=0, le=1
     )
-    max_grad_norm: float = _option(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
+    clip: float = _coefficient(0.2, "PPO's clipping range of the probability ratio (paper)", gt=0)
+    clip_value: bool = _option(False, "clip the value's change by `clip` as well (paper: yes; measured: no)")
+    value_coef: float = _coefficient(0.5, "weight of the squared value error (paper)", ge=0)
+    entropy_coef: float = _coefficient(0.01, "weight of the entropy, nats (paper)", ge=0)
+    max_grad_norm: float = _coefficient(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
     target_kl: float | None = _option(
         None, "divergence, in the agent's own frames, beyond which a step is undone; null: no limit", gt=0
     )
@@ -125,7 +123,7 @@ class RunConfig(BaseModel):
         "averaged over the four (paper)",
     )
     bootstrap_timeouts: bool = _option(False, "go on with the value after a time-out (paper: terminal)")
-    bonus_c: float = _option(
+    bonus_c: float = _coefficient(
         7.0, "C of the bonus (default: the paper's for the scenario, else 7 for lang and 3 for cell)", ge=0
     )
     bonus_m: float = _option(50.0, "M of the bonus: 50 pays first visits only (paper)", ge=0)
@@ -153,6 +151,42 @@ class RunConfig(BaseModel):
         "also send the figures to this project of Weights & Biases (needs the extra `wandb`)",
         result=False,
     )
+
+
+SCHEDULED: Final = tuple(
+    name
+    for name, field in _Starts.model_fields.items()
+    if field.json_schema_extra["scheduled"]  # type: ignore[index]
+)
+"""Options that may change during a run: linearly, from their own value to that of `NAME_end`."""
+
+
+def _end(name: str) -> Any:
+    """The option at which the schedule of another ends: of the same bounds, by default absent."""
+    bounds = Annotated[float, *_Starts.model_fields[name].metadata]
+    return bounds | None, _option(None, f"`{name}` after the last update, reached linearly; null: unchanged")
+
+
+if TYPE_CHECKING:
+    _Options = _Starts
+else:
+    _Options = create_model("_Options", __base__=_Starts, **{f"{name}_end": _end(name) for name in SCHEDULED})
+
+
+class RunConfig(_Options):
+    """Every option of a run, resolved: there is no `auto`. Equal configurations and code compute equal runs.
+
+    Defaults marked "measured" were chosen by runs of this trainer. Those marked "paper" are in the appendix of the
+    SocialAI 1.0 paper on its baselines, or in the code released with it.
+
+    Raises:
+        ValueError: a value is out of bounds, or two values contradict each other (pydantic's ValidationError).
+    """
+
+    _place: Path = PrivateAttr(default_factory=Path)
+    """The run's folder, from which what it keeps is named; it is not part of the configuration, so it may move."""
+    _code: Path | None = PrivateAttr(None)
+    """Where code of one's own is loaded from, if not from the run's folder."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -195,9 +229,25 @@ class RunConfig(BaseModel):
         return -(-self.frames // self.frames_per_update)
 
     @property
+    def ends(self) -> dict[str, float]:
+        """The options that change during the run, each with its value after the last update."""
+        ends = {name: getattr(self, f"{name}_end") for name in SCHEDULED}
+        return {name: end for name, end in ends.items() if end is not None}
+
+    def at(self, update: int) -> Self:
+        """The configuration with the values that scheduled options have after so many updates of the run."""
+
+        def now(start: float, end: float) -> float:
+            return start + (end - start) * update / self.updates
+
+        return self.model_copy(
+            update={name: now(getattr(self, name), end) for name, end in self.ends.items()}
+        )
+
+    @property
     def depends_on_frames(self) -> bool:
         """Whether an update depends on how many frames the run will have, so that more of them are another run."""
-        return self.guide != "none" or self.lr_end is not None or self.entropy_coef_end is not None
+        return bool(self.ends) or self.guide != "none" or ":" in self.bonus
 
     def differences(self, other: RunConfig) -> list[str]:
         """The options that keep a run with these from going on with the other ones."""

@@ -136,7 +136,6 @@ def ppo_loss(
     values: Tensor,
     sizes: tuple[int, ...],
     config: RunConfig,
-    entropy_coef: float,
     used: Tensor | None = None,
 ) -> LossParts:
     """PPO's clipped loss (Schulman et al. 2017, equations 7 and 9) for an action of several heads.
@@ -153,8 +152,7 @@ def ppo_loss(
         logits: (N, A) of the present policy.
         values: (N,) of the present critic.
         sizes: choices of each head.
-        config: coefficients.
-        entropy_coef: the entropy's weight at this time of the run.
+        config: coefficients, of this time of the run.
         used: which slots a template has, `NetSpec.used`.
     """
     log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)  # (N, H) each
@@ -177,7 +175,7 @@ def ppo_loss(
         entropy = (entropies * mask).sum(-1) * own  # (N,), of the heads that took part
         policy_term, value_term = (policy * mask).mean(), (value[:, None] * mask).mean()
         entropy_term = entropy.mean() / len(sizes)
-    total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
+    total = policy_term + config.value_coef * value_term - config.entropy_coef * entropy_term
     shown, imitation = torch.zeros_like(own), torch.zeros((), device=logits.device)  # (N,), scalar
     if batch.lead is not None:
         shown, example = batch.lead.weights, batch.lead.actions  # (N,), (N, H)
@@ -221,13 +219,14 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     Raises:
         TrainingStopped: a loss, a gradient or a weight is not finite.
     """
-    net, config = session.actor.net, session.config
+    net, config = session.actor.net, session.now
     sizes, used = net.spec.action_sizes, net.spec.used
     parameters = list(net.parameters())
+    session.optimizer.param_groups[0]["lr"] = config.lr * session.step_scale
     batch = estimate_advantages(config, rollout)
 
     def differentiate(share: Environments | Chunks) -> tuple[Figures, Sequence[Tensor | None]]:
-        parts = [ppo_loss(*part, sizes, config, session.entropy_coef, used) for part in share.evaluate(net)]
+        parts = [ppo_loss(*part, sizes, config, used) for part in share.evaluate(net)]
         loss = torch.stack([part.loss for part in parts]).mean() * share.weight
         found = Figures.pooled([part.figures() for part in parts])
         return found, torch.autograd.grad(loss, parameters, allow_unused=True)
@@ -333,7 +332,6 @@ def train(
             session.save(run_dir)
         metrics = Metrics(session)
         while session.update < config.updates and not stop():
-            session.optimizer.param_groups[0]["lr"] = session.learning_rate
             rollout = collect(session)
             losses = update(session, rollout, mapper)
             session.update += 1

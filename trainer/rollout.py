@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from trainer import actions as heads
+from trainer.bonus import BatchStep
 from trainer.errors import require_finite
 from trainer.extensions import require_array, require_shape
 from trainer.features import Actor, Int64
@@ -99,7 +100,7 @@ def _ids(envs: Any) -> tuple[Int64, Int64]:
 def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[Tensor, Lead]:
     """Ask the guide; returns the actions to play, int64 (E, H): its own where it leads, else those of the policy."""
     state, move = session.state, session.actor.move
-    found = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
+    found = guide.lead(session.envs, state.starts, session.progress)
     given = _checked(found, tuple(own.shape), session.actor.net.spec.action_sizes)
     state.led |= given.led
     lead = Lead(*map(move, given))
@@ -145,7 +146,8 @@ def _step(
 ) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[Any]]:
     """Step the environments; returns rewards with the bonus, which episodes ended, and their bootstrap, (E,) each."""
     envs, state, config = session.envs, session.state, session.config
-    observation, reward, terminated, truncated, infos = envs.step(actions.cpu().numpy())
+    played = actions.cpu().numpy()
+    observation, reward, terminated, truncated, infos = envs.step(played)
     ended, cut = terminated | truncated, truncated & ~terminated  # (E,)
     success = infos.get("success", np.zeros_like(ended))  # (E,)
     bootstrap = np.zeros(len(ended), np.float32)
@@ -162,7 +164,9 @@ def _step(
         tally.count(state, ended, cut, success)
         state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
     if session.bonus is not None:
-        found = session.bonus.step(envs, observation["image"], ended)
+        now, progress = session.now, session.progress
+        step = BatchStep(envs, observation["image"], played, reward, ended, success & ended, now, progress)
+        found = session.bonus.step(step)
         paid = require_array("bonus: the result of step", found, ended.shape, np.float64)
         require_finite("what the bonus paid", torch.from_numpy(paid).float())
         tally.bonus += float(paid.sum()) / config.frames_per_update

@@ -95,18 +95,14 @@ class Session:
         return self.update * self.config.frames_per_update
 
     @property
-    def learning_rate(self) -> float:
-        """Adam's, now."""
-        return self._scheduled(self.config.lr, self.config.lr_end) * self.step_scale
+    def progress(self) -> float:
+        """Share of the run's frames made so far, 0 to 1."""
+        return min(self.frames / self.config.frames, 1.0)
 
     @property
-    def entropy_coef(self) -> float:
-        """Weight of the entropy, now."""
-        return self._scheduled(self.config.entropy_coef, self.config.entropy_coef_end)
-
-    def _scheduled(self, start: float, end: float | None) -> float:
-        """Linear over the run's updates, from `start` before the first to `end` after the last."""
-        return start if end is None else start + (end - start) * self.update / self.config.updates
+    def now(self) -> RunConfig:
+        """The configuration with the present values of the options that change during the run."""
+        return self.config.at(self.update)
 
     @classmethod
     def start(cls, config: RunConfig, envs: Any, program: Any = None) -> Session:
@@ -229,7 +225,9 @@ class Session:
         if changed := new.differences(old):
             detail = ", ".join(f"{name}: {getattr(old, name)} -> {getattr(new, name)}" for name in changed)
             if changed == ["frames"]:
-                detail += " (guide and schedules reach from the first frame to the last)"
+                detail += (
+                    " (guide, schedules and a bonus of one's own reach from the first frame to the last)"
+                )
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
     def _load_adam(self, stored: dict[str, Tensor]) -> None:

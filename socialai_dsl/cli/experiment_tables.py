@@ -16,7 +16,7 @@ def plan_text(figures: Mapping[str, Any], each: bool) -> str:
             name,
             _numbers(row["seed"] for row in group),
             _range([row["frames"] for row in group]),
-            _range([row["frames_per_second"] for row in group if row["frames_per_second"]]) or "-",
+            _speed(group),
             _time(group),
             _states(row["state"] for row in group),
         )
@@ -24,10 +24,9 @@ def plan_text(figures: Mapping[str, Any], each: bool) -> str:
     ]
     sources = dict.fromkeys(row["speed_from"] for row in figures["runs"] if row["speed_from"])
     lines = [_title(figures), "", *_table(header, rows), ""]
-    unknown = figures["unknown"]
-    time = clock(figures["seconds"]) + (
-        f", and {unknown} of unknown speed (see --measure)" if unknown else ""
-    )
+    unknown, seconds = figures["unknown"], figures["seconds"]
+    known = [] if seconds is None else [clock(seconds)]
+    time = " and ".join(known + ([f"an unknown time (of {unknown} runs, see --measure)"] if unknown else []))
     lines.append(f"{len(figures['runs'])} runs, {figures['workers']} at once: {time} left")
     besides = f"{clock(figures['seconds_besides'])} a run are counted for starting and testing"
     lines.append(f"speeds are those of {'; '.join(sources)}; {besides}" if sources else besides)
@@ -100,9 +99,15 @@ def _share(group: Sequence[Mapping[str, Any]]) -> float:
     return sum(min(done, frames) for done, frames in pairs) / wanted
 
 
+def _speed(group: Sequence[Mapping[str, Any]]) -> str:
+    """The speeds of runs that train."""
+    speeds = [row["frames_per_second"] for row in group if row["frames"]]
+    return "unknown" if None in speeds else _range(speeds) or "-"
+
+
 def _time(group: Sequence[Mapping[str, Any]]) -> str:
-    known = [row["seconds"] for row in group if row["seconds"] is not None]
-    return clock(sum(known)) if known else "-"
+    times = [row["seconds"] for row in group]
+    return "unknown" if None in times else clock(sum(times))
 
 
 def _numbers(seeds: Iterable[int]) -> str:

@@ -27,7 +27,7 @@ class RunProgress:
         self._stream = stream
         self._scenario = scenario
         self._last_line = self._last_sentence = time.monotonic()
-        self._success: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
+        self._ended: deque[tuple[float, int]] = deque(maxlen=_REMEMBERED_UPDATES)
         self._speed: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
         self._bar: Progress | None = None
 
@@ -46,7 +46,7 @@ class RunProgress:
             self._begin(progress)
             return
         if progress.success is not None:
-            self._success.append(progress.success)
+            self._ended.append((progress.success, progress.episodes))
         self._speed.append(progress.frames_per_second)
         frames, total, text = progress.frames, progress.total, self._text(progress)
         if self._bar is not None:
@@ -86,7 +86,9 @@ class RunProgress:
         # The mean time of a frame, not the mean speed: a slow update counts for as long as it took.
         speed = len(self._speed) / sum(1 / max(s, 1e-9) for s in self._speed)
         left = max(progress.total - progress.frames, 0) / speed
-        success = f"  success {sum(self._success) / len(self._success):.3f}" if self._success else ""
+        episodes = sum(episodes for _, episodes in self._ended)
+        succeeded = sum(success * episodes for success, episodes in self._ended)
+        success = f"  success {succeeded / episodes:.3f}" if episodes else ""
         return f"{speed:>9,.0f} frames/s{success}  {_clock(left)} left"
 
 

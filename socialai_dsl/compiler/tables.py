@@ -144,6 +144,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         entities=tuple(_entity_name(entity) for entity in checked.entities),
         registers=tuple(registers.names),
         lines=tuple(lines.texts),
+        line_speakers=_speakers_of(lines),
         outcome_table=(
             *(Outcome(o.name, o.success, o.condition.span) for o in checked.outcomes),
             Outcome("deadly", False),
@@ -156,6 +157,12 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         looks=tuple((look.name, look.words) for look in shown),
         names_shown=checked.names_shown,
     )
+
+
+def _speakers_of(lines: Lines) -> tuple[int, ...]:
+    """Who says each line."""
+    speaker_of = {line: speaker for speaker, own in lines.speakers.items() for line in own}
+    return tuple(speaker_of[line] for line in range(len(lines.texts)))
 
 
 def _look_rows(allocation: Allocation, shown: list[LookPlan]) -> list[int]:

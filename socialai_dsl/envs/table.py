@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,6 +135,18 @@ def too_early(call: str, fresh: NDArray[np.bool_]) -> ValueError:
     return ValueError(
         f"{call}: got environments that were never reset, {rows[:10]}; expected reset() of all first"
     )
+
+
+class HeardLines(NamedTuple):
+    """The lines that the agents of E environments heard in a step, at most K each, in the order spoken.
+
+    Attributes:
+        speakers: int64 (E, K), who said each: 0 the agent, 1 the first of the others in the order of the cast; -1 none.
+        lines: int64 (E, K), the text of each as an index into `lines` of the vector environment; -1 none.
+    """
+
+    speakers: NDArray[np.int64]
+    lines: NDArray[np.int64]
 
 
 class Start(NamedTuple):
@@ -443,16 +455,47 @@ class Table(Copied):
 
     def utterance_ids(self) -> NDArray[np.int64]:
         """A number for what was heard in the last step, int64 (E,); 0 for silence."""
-        registers, played = self.state.registers, self.batch.program_numbers()
         ids = np.zeros(self.rows, np.uint64)
+        for number, k, rows, said in self._spoken():
+            lines = self._texts[number][said] + np.uint64(1)
+            ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
+        return ids.view(np.int64)
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The texts of all lines that can be heard in any program, each once."""
+        return tuple(dict.fromkeys(line for program in self.programs for line in program.lines))
+
+    @cached_property
+    def _line_parts(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Of each program the speaker of each line, and the index of its text in `lines`."""
+        index = {line: number for number, line in enumerate(self.lines)}
+        return [
+            (
+                np.array(program.line_speakers, np.int64),
+                np.array([index[line] for line in program.lines], np.int64),
+            )
+            for program in self.programs
+        ]
+
+    def heard_lines(self) -> HeardLines:
+        """Who said what in the last step, as far as the agent heard it."""
+        most = max(program.header(Header.HEARD_SIZE) for program in self.programs)
+        speakers, lines = (np.full((self.rows, most), -1, np.int64) for _ in range(2))
+        for number, k, rows, said in self._spoken():
+            speaker_of, text_of = self._line_parts[number]
+            speakers[rows, k], lines[rows, k] = speaker_of[said], text_of[said]
+        return HeardLines(speakers, lines)
+
+    def _spoken(self) -> Iterator[tuple[int, int, NDArray[np.int64], NDArray[np.int32]]]:
+        """What was heard in the last step: a program, the how-manieth line, the rows that heard one, its numbers."""
+        registers, played = self.state.registers, self.batch.program_numbers()
+        heard = registers[:, Register.HEARD]
         for number, program in enumerate(self.programs):
             first = program.header(Header.HEARD)
-            heard = registers[:, Register.HEARD]
             for k in range(program.header(Header.HEARD_SIZE)):
                 rows = np.flatnonzero((played == number) & (heard > k))
-                lines = self._texts[number][registers[rows, first + k]] + np.uint64(1)
-                ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
-        return ids.view(np.int64)
+                yield number, k, rows, registers[rows, first + k]
 
     def history_ids(self) -> NDArray[np.int64]:
         """A number for all that was heard since the reset, int64 (E,); 0 for nothing."""

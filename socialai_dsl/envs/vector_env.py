@@ -15,7 +15,7 @@ from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import frame
-from socialai_dsl.envs.table import Table, joined
+from socialai_dsl.envs.table import HeardLines, Table, joined
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable
 
@@ -246,6 +246,21 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
     def utterance_ids(self) -> NDArray[np.int64]:
         """An id of what was heard in the last step, int64 (E,): equal for equal texts, 0 for silence."""
         return self._table.utterance_ids()
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The texts of all lines that can be heard, each once, which `heard_lines` indexes."""
+        return self._table.lines
+
+    def heard_lines(self) -> HeardLines:
+        """Who said what in the last step, as far as the agents heard it.
+
+        Returns:
+            `speakers`, int64 (E, K): 0 the agent itself, 1 the first of the others in the order of the cast, and so on.
+            `lines`, int64 (E, K): indices into `lines`. Both in the order spoken, -1 behind the last; K is the most
+            that can be heard in one step. In same-step mode, a step that ends an episode leaves nothing heard.
+        """
+        return self._table.heard_lines()
 
     def history_ids(self) -> NDArray[np.int64]:
         """An id of all that was heard since the reset, int64 (E,): equal for equal histories, 0 for none."""

@@ -15,7 +15,7 @@ from socialai_dsl.experiments.folder import PlannedRun
 def plan_figures(
     document: Mapping[str, Any], folder: Path, runs: Sequence[PlannedRun], speeds: Speeds, workers: int
 ) -> dict[str, Any]:
-    """The plan: each run with its state and the seconds left, and the sum.
+    """The plan: each run with its state and the seconds left, and the sum; None where nothing is known of a time left.
 
     Args:
         document: of the experiment.
@@ -34,12 +34,13 @@ def plan_figures(
         seconds = 0.0 if row["state"] in ("failed", "cancelled") else _remaining(speeds, run)
         rows.append(row | known | {"seconds": None if seconds is None else round(seconds, 1)})
     known_seconds = [row["seconds"] for row in rows if row["seconds"] is not None]
+    known, unknown = sum(known_seconds), len(rows) - len(known_seconds)
     return {
         **_head(document, folder),
         "workers": workers,
-        "seconds": round(sum(known_seconds) / workers, 1),
+        "seconds": round(known / workers, 1) if known or not unknown else None,
         "seconds_besides": round(speeds.seconds_besides, 1),
-        "unknown": len(rows) - len(known_seconds),
+        "unknown": unknown,
         "states": dict(Counter(row["state"] for row in rows)),
         "runs": rows,
     }

@@ -118,6 +118,7 @@ class Program:
         entities: the agent, the NPCs and the objects, by number.
         registers: the registers of the scenario itself.
         lines: text of each line that can be heard, by number.
+        line_speakers: who says each of them, the number of an entity.
         outcome_table: the ways an episode can end, by index; the last two are `deadly` and `timeout`.
         rules: name of each counted rule.
         vocabulary: word of each token id; 0 pads, 1 is unknown.
@@ -134,6 +135,7 @@ class Program:
     entities: tuple[EntityName, ...]
     registers: tuple[RegisterName, ...]
     lines: tuple[str, ...]
+    line_speakers: tuple[int, ...]
     outcome_table: tuple[Outcome, ...]
     rules: tuple[str, ...]
     vocabulary: tuple[str, ...]

@@ -94,7 +94,9 @@ def continued_config(config: RunConfig, options: Mapping[str, Any], folder: Path
     if changed := config.differences(asked):
         name, reason = changed[0], "because a run goes on with the options it began with"
         if name == "frames":
-            reason = "because guide and schedules of this run reach from its first frame to its last"
+            reason = (
+                "because its guide, its schedules or its own bonus reach from the first frame to the last"
+            )
         raise OptionError(name, f"got {getattr(asked, name)}, expected {getattr(config, name)}, {reason}")
     return asked
 
@@ -202,7 +204,7 @@ def _refuse_idle(given: Iterable[str], config: RunConfig) -> None:
     """Refuse what belongs to something that this run does not have."""
     for name in given:
         for part in ("guide", "bonus"):
-            if name in _OF_PART[part] and getattr(config, part) == "none":
+            if name.removesuffix("_end") in _OF_PART[part] and getattr(config, part) == "none":
                 raise OptionError(name, f"it is for a {part}, and this run has none")
 
 

@@ -57,6 +57,7 @@ class Progress:
         frames: trained so far, earlier parts of a resumed run included.
         total: those that it will have been trained for; 0 of an agent that is not trained.
         success: share of the episodes ended in this update that succeeded; None if none ended.
+        episodes: how many of the agent's own ended in this update.
         frames_per_second: of this update; 0 before the first.
         learnt: what the agent has learnt so far, in words; empty where there is nothing to say.
     """
@@ -66,6 +67,7 @@ class Progress:
     frames: int
     total: int
     success: float | None = None
+    episodes: int = 0
     frames_per_second: float = 0.0
     learnt: str = ""
 
@@ -209,7 +211,7 @@ def _train(
     learnt = Learnt(loaded, endings_of(loaded, program))
 
     def updated(row: Mapping[str, Any]) -> None:
-        figures = row["frames"], total, row["success"], row["frames_per_second"]
+        figures = row["frames"], total, row["success"], row["episodes"], row["frames_per_second"]
         report(Progress(run, program, *figures, learnt.sentence(row)))
 
     try:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, SCHEDULED, RunConfig, configure
 
 
 def test_the_defaults_are_the_settings_that_worked() -> None:
@@ -87,6 +87,41 @@ def test_few_environments_are_few_minibatches() -> None:
     assert configure("guided", envs=8).minibatches == 8
     with pytest.raises(ValueError, match="minibatches: got 16, expected at most envs = 8"):
         configure("guided", envs=8, minibatches=16)
+
+
+def test_every_coefficient_has_an_end_of_its_own_bounds_and_goes_there_evenly() -> None:
+    expected = {
+        "lr",
+        "clip",
+        "value_coef",
+        "entropy_coef",
+        "imitation_coef",
+        "bonus_c",
+        "gamma",
+        "gae_lambda",
+    }
+    assert expected | {"max_grad_norm"} == set(SCHEDULED)
+    assert {name for name in RunConfig.model_fields if name.endswith("_end")} == {
+        f"{n}_end" for n in SCHEDULED
+    }
+    for name in SCHEDULED:
+        start, end = RunConfig.model_fields[name], RunConfig.model_fields[f"{name}_end"]
+        assert end.default is None
+        with pytest.raises(ValueError, match=f"{name}_end"):
+            RunConfig(**{f"{name}_end": -1.0})
+        config = RunConfig(frames=4 * 8192, **{f"{name}_end": 0.5 * start.default})
+        values = [getattr(config.at(update), name) for update in range(5)]
+        assert values == pytest.approx([start.default * (1 - update / 8) for update in range(5)])
+        changed = config.at(3).model_dump().items() - config.model_dump().items()
+        assert {option for option, _ in changed} == {name}
+    assert RunConfig().at(17) == RunConfig()
+
+
+def test_more_frames_are_another_run_where_an_update_depends_on_them() -> None:
+    plain = [{}, {"bonus": "lang"}, {"net": "mine:Net"}]
+    assert not any(RunConfig(**options).depends_on_frames for options in plain)  # type: ignore[arg-type]
+    others = [{"guide": "script"}, {"bonus": "mine:Bonus"}, *({f"{name}_end": 0.5} for name in SCHEDULED)]
+    assert all(RunConfig(**options).depends_on_frames for options in others)  # type: ignore[arg-type]
 
 
 def test_updates_are_rounded_up() -> None:

@@ -54,8 +54,8 @@ class Bonus:
     def __init__(self, config, num_envs):
         self.counts = np.zeros(1000, np.int64)
 
-    def step(self, envs, image, ended):
-        heard = envs.utterance_ids()
+    def step(self, step):
+        heard = step.envs.utterance_ids()
         np.add.at(self.counts, heard, 1)
         return 0.1 / np.sqrt(self.counts[heard])
 

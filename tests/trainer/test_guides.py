@@ -44,7 +44,7 @@ def mixed_batch() -> tuple[Batch, torch.Tensor]:
 def test_the_loss_of_led_and_own_frames_together() -> None:
     batch, logits = mixed_batch()
     config = RunConfig(imitation_coef=0.7)
-    parts = ppo_loss(batch, logits, torch.full((3,), 1.5), (2, 2, 2, 2), config, entropy_coef=0.01)
+    parts = ppo_loss(batch, logits, torch.full((3,), 1.5), (2, 2, 2, 2), config)
     policy = -2 * 1.2  # of the own frame alone, whose ratio 1.2 ** 4 is clipped
     value = (1.5**2 + 0.5**2 + 1.5**2) / 3
     entropy = -(2 + 0.6 * 2) * (0.6 * log(0.6) + 0.4 * log(0.4))
@@ -82,11 +82,11 @@ def test_figures_of_the_agent_s_own_frames_do_not_depend_on_led_ones(led: int, l
     log_probs, _ = log_probs_and_entropies(before, actions, sizes)
     lead = Lead(actions, torch.arange(10) < led, torch.ones(10))
     batch = Batch(actions, log_probs, values, advantages, values + 1, lead)
-    parts = ppo_loss(batch, logits, values, sizes, config, 0.01)
+    parts = ppo_loss(batch, logits, values, sizes, config)
     assert np.isfinite([parts.loss.item(), parts.value_loss.item(), parts.imitation_loss.item()]).all()
     own = slice(led, None)
     alone = Batch(actions[own], log_probs[own], values[own], advantages[own], values[own] + 1)
-    expected = ppo_loss(alone, logits[own], values[own], sizes, config, 0.01)
+    expected = ppo_loss(alone, logits[own], values[own], sizes, config)
     for name in OF_OWN:
         figure = getattr(parts, name).item()
         if led == 10:

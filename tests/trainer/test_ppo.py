@@ -75,7 +75,7 @@ def config(**changes: Any) -> RunConfig:
 
 def test_joint_loss_of_a_spoken_action() -> None:
     batch, logits = one_frame(True, advantage=-2.0, acting=0.5, now=0.6)
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY)
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config())
     ratio = 1.2**4
     assert parts.policy_loss.item() == pytest.approx(2 * ratio, rel=1e-5), (
         "a bad action's growing ratio is not clipped"
@@ -90,16 +90,16 @@ def test_joint_loss_of_a_spoken_action() -> None:
 
 def test_joint_loss_clips_a_good_action_s_ratio() -> None:
     batch, logits = one_frame(True, advantage=2.0, acting=0.5, now=0.6)
-    assert ppo_loss(
-        batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY
-    ).policy_loss.item() == pytest.approx(-2 * 1.2)
+    assert ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config()).policy_loss.item() == pytest.approx(
+        -2 * 1.2
+    )
 
 
 def test_silence_leaves_template_and_noun_out() -> None:
     batch, _ = one_frame(False, advantage=-2.0, acting=0.5, now=0.6)
     logits = torch.tensor([[log(0.4), log(0.6), log(0.6), log(0.4), log(0.2), log(0.8), log(0.9), log(0.1)]])
     logits.requires_grad_()
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), 0.0)
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(entropy_coef=0.0))
     assert parts.policy_loss.item() == pytest.approx(2 * (0.6 / 0.5) ** 2, rel=1e-5)
     parts.loss.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
@@ -120,8 +120,8 @@ def test_the_entropy_is_that_of_all_actions(sizes: tuple[int, int, int, int]) ->
         torch.zeros(5, 4, dtype=torch.float64),
         *torch.zeros(3, 5, dtype=torch.float64),
     )
-    settings = config(value_coef=0.0)
-    parts = ppo_loss(batch, logits, torch.zeros(5, dtype=torch.float64), sizes, settings, entropy_coef=1.0)
+    settings = config(value_coef=0.0, entropy_coef=1.0)
+    parts = ppo_loss(batch, logits, torch.zeros(5, dtype=torch.float64), sizes, settings)
     first, speak, template, noun = (part.softmax(1) for part in logits.split(list(sizes), 1))
     silent = first * speak[:, :1]
     spoken = torch.einsum("na,nb,nc->nabc", first * speak[:, 1:], template, noun)
@@ -153,9 +153,9 @@ def test_the_entropy_with_several_slots_is_that_of_all_actions_too() -> None:
         torch.zeros(5, 5, dtype=torch.float64),
         *torch.zeros(3, 5, dtype=torch.float64),
     )
-    settings = config(value_coef=0.0)
+    settings = config(value_coef=0.0, entropy_coef=1.0)
     zeros = torch.zeros(5, dtype=torch.float64)
-    parts = ppo_loss(batch, logits, zeros, sizes, settings, 1.0, USED)
+    parts = ppo_loss(batch, logits, zeros, sizes, settings, USED)
     first, speak, template, what, whom = (part.softmax(1) for part in logits.split(list(sizes), 1))
     said = [
         torch.einsum("nb,nc->nbc", what, whom).flatten(1) * template[:, :1],
@@ -186,7 +186,7 @@ def test_a_slot_that_the_template_lacks_is_not_learnt_from(loss: Any) -> None:
 
     def of(word: int) -> torch.Tensor:
         batch = Batch(torch.tensor([[0, 1, 1, 2, word]]), torch.full((1, 5), -1.0), *torch.ones(3, 1) * 2)
-        return ppo_loss(batch, logits, torch.ones(1), sizes, config(loss=loss), 0.0, USED).loss
+        return ppo_loss(batch, logits, torch.ones(1), sizes, config(loss=loss, entropy_coef=0.0), USED).loss
 
     assert of(0).item() == of(1).item()
     (gradient,) = torch.autograd.grad(of(0), logits)
@@ -200,7 +200,7 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
         [[log(0.4), log(0.6), log(0.45), log(0.55), log(0.2), log(0.8), log(0.9), log(0.1)]]
     )
     batch = batch._replace(log_probs=torch.tensor([[log(0.5), log(0.5), log(0.5), log(0.5)]]))
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"), ENTROPY)
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"))
     primitive, speak = -2 * min(1.2, 1.2), -2 * (0.45 / 0.5)
     entropies = entropy_of(0.6) + entropy_of(0.55)
     expected = (primitive + speak) / 4 + 0.5 * 2.25 * 2 / 4 - 0.01 * entropies / 4
@@ -209,7 +209,7 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
 
 def test_clipped_value_loss_takes_the_worse_of_the_two() -> None:
     batch, logits = one_frame(True, advantage=0.0, acting=0.5, now=0.5)
-    parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True), ENTROPY)
+    parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True))
     assert parts.value_loss.item() == pytest.approx((1.2 - 3) ** 2), (
         "acting value 1, change clipped to 0.2, return 3"
     )
@@ -227,7 +227,7 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
         returns=torch.tensor([3.0, 1.5]),
     )
     settings = config(loss="per_head", clip_value=True)
-    parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings, ENTROPY)
+    parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings)
     clipped = (1.2 - 3) ** 2  # worse than (2.5 - 3) ** 2
     plain = (0.5 - 1.5) ** 2  # worse than (0.8 - 1.5) ** 2
     assert parts.value_loss.item() == pytest.approx((4 * clipped + 2 * plain) / 8)
@@ -246,7 +246,7 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
 )
 def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: float) -> None:
     batch, logits = one_frame(True, advantage, acting=0.5, now=now)
-    parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"), ENTROPY)
+    parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"))
     assert parts.policy_loss.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
 
 
@@ -269,9 +269,7 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
         minibatch = cut_out(session, rollout, batch, envs)
         ((_, logits, values),) = minibatch.evaluate(session.actor.net)
         assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
-        parts = ppo_loss(
-            minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config, ENTROPY
-        )
+        parts = ppo_loss(minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config)
         assert parts.approx_kl.item() == pytest.approx(0, abs=1e-6)
         assert parts.clip_fraction.item() == 0
 
@@ -324,7 +322,7 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, scaled, gains + rollout.values)
     everything = cut_out(session, rollout, batch, torch.arange(8))
     ((_, logits, values),) = everything.evaluate(twin)
-    loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config, ENTROPY)
+    loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config)
     loss.loss.backward()  # type: ignore[no-untyped-call]
     norm = torch.nn.utils.clip_grad_norm_(twin.parameters(), config.max_grad_norm)
     optimizer.step()

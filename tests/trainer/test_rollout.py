@@ -10,6 +10,7 @@ import torch
 from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
+from trainer.bonus import BatchStep
 from trainer.errors import ObservationError, TrainingStopped
 from trainer.features import Actor
 from trainer.nets import NetSpec, build_net
@@ -115,6 +116,33 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     _, terminal = play(small_config(), EchoEnvs(8, limit=4))
     assert terminal.tally.timeouts > 0
     assert (terminal.bootstrap == 0).all()
+
+
+def test_a_bonus_is_told_what_was_played_and_paid_and_when(small_config: Any) -> None:
+    """In the third of four updates, with a scale that has gone half the way to its end."""
+
+    class Remembers:
+        def __init__(self) -> None:
+            self.steps: list[BatchStep] = []
+
+        def step(self, step: BatchStep) -> np.ndarray:
+            copied = [array.copy() for array in step[1:6]]
+            self.steps.append(BatchStep(step.envs, *copied, step.config, step.progress))
+            return np.full(8, 0.5)
+
+    config = small_config(frames=8 * 8 * 4, bonus_c=4.0, bonus_c_end=0.0, guide="script", guide_share=1.0)
+    envs = EchoEnvs(8)
+    session = Session.start(config, envs)
+    session.update, session.bonus = 2, Remembers()  # type: ignore[assignment]
+    rollout = collect(session)
+    steps = session.bonus.steps  # type: ignore[union-attr]
+    assert torch.equal(torch.from_numpy(np.stack([step.actions for step in steps])), rollout.actions)
+    paid = torch.from_numpy(np.stack([step.rewards for step in steps]).astype(np.float32))
+    assert torch.allclose(paid + 0.5, rollout.rewards)
+    assert torch.equal(torch.from_numpy(np.stack([step.ended for step in steps])), rollout.ended)
+    assert sum(step.success.sum() for step in steps) == envs.counters()["outcomes"]["right"] > 0
+    assert {(step.progress, step.config.bonus_c) for step in steps} == {(0.5, 2.0)}
+    assert (steps[-1].image == session.state.image).all()
 
 
 def test_an_end_in_the_last_moment_beats_the_time_out(small_config: Any) -> None:

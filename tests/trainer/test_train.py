@@ -21,6 +21,7 @@ from gymnasium.vector import AutoresetMode
 import socialai_dsl
 from socialai_dsl.evaluation import evaluate_policy
 from tests.trainer.fake_envs import EchoEnvs
+from trainer import ppo
 from trainer import ppo as training
 from trainer.checkpoint import read
 from trainer.config import RunConfig
@@ -117,21 +118,27 @@ def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path, small_config: 
 def test_schedules_fall_evenly_to_their_ends(
     tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    used: list[tuple[float, float]] = []
-    real = training.update
+    used: list[tuple[float, float, float]] = []
+    real_step, real_loss = torch.optim.Adam.step, ppo.ppo_loss
 
-    def note(session: Any, *rest: Any) -> Any:
-        (group,) = session.optimizer.param_groups
-        used.append((group["lr"], session.entropy_coef))
-        return real(session, *rest)
+    def note_loss(*frames: Any) -> Any:
+        used.append((0.0, frames[4].entropy_coef, frames[4].clip))
+        return real_loss(*frames)
 
-    monkeypatch.setattr(training, "update", note)
-    config = small_config(frames=64 * 4, lr=8e-4, lr_end=4e-4, entropy_coef=0.04, entropy_coef_end=0.0)
-    train(config, EchoEnvs(8), tmp_path)
-    assert used == [pytest.approx((8e-4 - k * 1e-4, 0.04 - k * 0.01)) for k in range(4)]
+    def note_step(optimizer: Any) -> Any:
+        used[-1] = (optimizer.param_groups[0]["lr"], *used[-1][1:])
+        return real_step(optimizer)
+
+    monkeypatch.setattr(ppo, "ppo_loss", note_loss)
+    monkeypatch.setattr(torch.optim.Adam, "step", note_step)
+    start = {"lr": 8e-4, "entropy_coef": 0.04, "clip": 0.2, "epochs": 1, "minibatches": 1}
+    ends = {"lr_end": 4e-4, "entropy_coef_end": 0.0, "clip_end": 0.1}
+    train(small_config(frames=64 * 4, **start, **ends), EchoEnvs(8), tmp_path)
+    expected = [(8e-4 - k * 1e-4, 0.04 - k * 0.01, 0.2 - k * 0.025) for k in range(4)]
+    assert used == [pytest.approx(values) for values in expected]
     used.clear()
-    train(small_config(frames=64 * 2, lr=8e-4, entropy_coef=0.04), EchoEnvs(8), tmp_path / "flat")
-    assert used == [(8e-4, 0.04)] * 2
+    train(small_config(frames=64 * 2, **start), EchoEnvs(8), tmp_path / "flat")
+    assert used == [(8e-4, 0.04, 0.2)] * 2
 
 
 def test_as_many_checkpoints_are_kept_as_were_asked_for(tmp_path: Path, small_config: Any) -> None:

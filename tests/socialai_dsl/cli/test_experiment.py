@@ -57,12 +57,21 @@ def test_a_plan(file: Path, capsys: Capture) -> None:
         "\n"
         "condition      seeds  frames  frames/s  time left  state\n"
         "dance / fast   0, 1   100     5,000     30 s       2 waiting\n"
-        "dance / paper  0, 1   100     -         -          2 waiting\n"
+        "dance / paper  0, 1   100     unknown   unknown    2 waiting\n"
         "chance         0      0       -         15 s       waiting\n"
         "\n"
-        "5 runs, 2 at once: 22 s, and 2 of unknown speed (see --measure) left\n"
+        "5 runs, 2 at once: 22 s and an unknown time (of 2 runs, see --measure) left\n"
         "speeds are those of what is usual for this network; 15 s a run are counted for starting and testing\n"
     )
+
+
+def test_what_is_not_known_is_no_time_at_all(file: Path, capsys: Capture) -> None:
+    file.write_text(
+        TINY.replace("[fast, paper]", "[paper]").replace("  - {name: chance", "  # {name: chance")
+    )
+    assert main(["experiment", "plan", str(file), "--workers", "1"]) == 0
+    assert "2 runs, 1 at once: an unknown time (of 2 runs, see --measure) left\n" in capsys.readouterr().out
+    assert planned(file, capsys)["seconds"] is None
 
 
 def test_a_plan_for_programs(file: Path, capsys: Capture) -> None:

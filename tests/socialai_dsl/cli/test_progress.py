@@ -38,8 +38,8 @@ class Training:
         stream.seek(0)
         stream.truncate()
 
-    def update(self, frames: int, success: float | None, speed: float) -> None:
-        self.shown.update(Progress(self.run, self.program, frames, self.total, success, speed))
+    def update(self, frames: int, success: float | None, speed: float, episodes: int = 1) -> None:
+        self.shown.update(Progress(self.run, self.program, frames, self.total, success, episodes, speed))
 
 
 def test_lines_are_rare_and_the_last_update_is_always_shown(clock: Clock, tmp_path: Path) -> None:
@@ -71,6 +71,15 @@ def test_updates_in_which_no_episode_ended_do_not_spoil_the_success(clock: Clock
     with shown.shown:
         shown.update(50, 0.25, 10)
         shown.update(100, None, 10)
+    assert "success 0.250" in stream.getvalue()
+
+
+def test_each_episode_counts_once_however_many_ended_with_it(clock: Clock, tmp_path: Path) -> None:
+    stream = io.StringIO()
+    shown = Training(100, stream, tmp_path)
+    with shown.shown:
+        shown.update(50, 1.0, 10, episodes=1)
+        shown.update(100, 0.0, 10, episodes=3)
     assert "success 0.250" in stream.getvalue()
 
 

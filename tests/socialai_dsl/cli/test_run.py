@@ -371,9 +371,9 @@ class Bonus:
     def __init__(self, config, num_envs):
         self.paid = np.zeros(1)
 
-    def step(self, envs, image, ended):
-        self.paid += len(ended)
-        return np.full(len(ended), 0.125)
+    def step(self, step):
+        self.paid += len(step.ended)
+        return np.full(len(step.ended), 0.125)
 
     def state(self):
         return {"paid": self.paid}
@@ -501,7 +501,7 @@ def test_an_error_in_code_of_ones_own_names_its_place(capsys: Capture) -> None:
     Path("mine.py").write_text(
         "class Bonus:\n"
         "    def __init__(self, config, num_envs): pass\n"
-        "    def step(self, envs, image, ended): return not_there\n"
+        "    def step(self, step): return not_there\n"
         "    def state(self): return {}\n"
         "    def load_state(self, state): pass\n"
     )

@@ -162,6 +162,40 @@ def test_ids_tell_utterances_histories_and_pictures_apart() -> None:
         assert (ids["utterance"] == 0).tolist() == silent
 
 
+@pytest.mark.parametrize("scenario", ["novel/gossip", "social_env"])
+def test_the_parts_of_what_is_heard_are_those_of_the_transcript(scenario: str) -> None:
+    """Who speaks is the member of the cast whose present name begins the line; texts and their order are the lines'."""
+    envs = sd.make_vec(f"{scenario}+oracle", 40, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    assert len(set(envs.lines)) == len(envs.lines), "each text once"
+    fixed: dict[tuple[str, int], str] = {}
+    several = 0
+    for _ in range(30):
+        envs.step(envs.scripted_actions())
+        heard = envs.heard_lines()
+        assert heard.speakers.dtype == heard.lines.dtype == np.int64
+        assert heard.speakers.shape == heard.lines.shape
+        for row, text in enumerate(envs.utterances()):
+            count = int((heard.lines[row] >= 0).sum())
+            assert (heard.speakers[row, :count] >= 0).all()
+            assert (heard.lines[row, count:] == heard.speakers[row, count:]).all(), "both -1 behind the last"
+            said = [envs.lines[line] for line in heard.lines[row, :count].tolist()]
+            assert "\n".join(said) == ("" if text == "NA" else text)
+            several += count > 1
+            program = envs.programs[envs.member_ids()[row]]
+            described = envs.describe(row)
+            for speaker, line in zip(heard.speakers[row].tolist(), said, strict=False):
+                entity = program.entities[speaker]
+                assert entity.role == "npc", "its script plays silently for the agent itself"
+                name = line.partition(": ")[0]
+                member = described.get(entity.key, {})
+                drawn = (member if entity.index is None else member[entity.index]).get("name")
+                assert name == (drawn or fixed.setdefault((program.name, speaker), name))
+    assert several > 0
+    assert len(fixed) > 1
+    assert len(set(fixed.values())) == len(fixed)
+
+
 def test_equal_texts_have_one_number_whoever_says_them() -> None:
     envs = sd.make_vec("talkitout", 2)
     room: dict[str, Any] = {"room": {"width": 8, "height": 8}, "agent": {"at": [2, 2]}}
