@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Final
 
 from socialai_dsl.source import Source, Span
@@ -387,6 +388,19 @@ def _cells(text: str) -> int:
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 file`, `2 files`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def is_usage(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Whether all that is wrong lies in how a scenario was named, or in a file that cannot be read (S007).
+
+    Such findings point into the name itself, which is no file.
+    """
+    return all(d.code == "S007" or not Path(d.span.file).is_file() for d in diagnostics)
 
 
 def to_json(diagnostics: Iterable[Diagnostic]) -> list[dict[str, str | int | None]]:

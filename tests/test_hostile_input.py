@@ -17,7 +17,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.reporters import REPORTERS
+from socialai_dsl.cli.validate import REPORTS
 from socialai_dsl.diagnostics import ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.frontend import check
@@ -288,12 +288,12 @@ def attempts(text: str) -> Iterator[list[str]]:
     replaced["value"] = SMALL.replace("scenario: small", f"scenario: small\nabout: {escaped(text)}", 1)
     for name, content in replaced.items():
         Path(f"{name}.yaml").write_text(content, encoding="utf-8", errors="surrogatepass")
-        yield from (["validate", f"{name}.yaml", "--format", style] for style in REPORTERS)
+        yield from (["validate", f"{name}.yaml", "--format", style] for style in REPORTS)
         yield ["show", f"{name}.yaml", "--origin"]
         yield ["fmt", "--check", f"{name}.yaml"]
     named = f"{text.encode('utf-8', 'ignore').decode().replace('/', '').replace(chr(0), '')}.yaml"
     Path(named).write_text(SMALL.replace("horizon", "horizn", 1))
-    yield from (["validate", f"./{named}", "--format", style] for style in REPORTERS)
+    yield from (["validate", f"./{named}", "--format", style] for style in REPORTS)
     Path(named).write_text(SMALL)
     yield from (["show", f"./{named}", "--origin"], ["show", f"./{named}"])
     for command in (

@@ -57,7 +57,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "semantics": ({"source", "diagnostics", "draws", "vocabulary", "widths", "grammar", "schema"}, set()),
     "loader": (
-        TEXT_SIDE - {"frontend", "checking", "library"},
+        TEXT_SIDE - {"frontend", "checking", "library"} | {"errors"},
         {"yaml", "pydantic", "pydantic_core"},
     ),
     "library": (TEXT_SIDE - {"frontend", "checking"}, {"pydantic"}),

@@ -14,6 +14,8 @@ from socialai_dsl.analysis.reports import Evidence, Report
 from socialai_dsl.analysis.scenario_report import ScenarioReport
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.engine.jit import load as load_compiled
+from socialai_dsl.engine.kernel import serve
 from socialai_dsl.frontend import load
 from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.source import Source
@@ -82,6 +84,11 @@ def check_scenario(
     report.complete = True
     tell()
     return report
+
+
+def compile_engine() -> None:
+    """Make the engine ready; where it is not compiled yet, that takes longer than most checks."""
+    load_compiled(serve)
 
 
 def _tried(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

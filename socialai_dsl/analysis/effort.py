@@ -9,6 +9,9 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
+EPISODES: Final = 200
+"""How many episodes of each agent tell the coverage of a scenario."""
+
 Tell = Callable[[str], None]
 """Takes a line about how far something is."""
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final
 
+from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.errors import UsageError
 
@@ -14,7 +15,6 @@ STYLE: Final[dict[str, Any]] = {
     "help": "style of the observations (default: prose)",
 }
 """The option `--style`: how a language model reads observations."""
-ROOMS: Final = 100
 SECONDS: Final = 20.0
 _LONGEST: Final = 366 * 24 * 3600
 _MOST: Final = 10**9
@@ -55,7 +55,7 @@ def typed_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[s
 
 def add_effort(parser: argparse.ArgumentParser) -> None:
     """Declare how much is tried, and for how long; what is not given is None."""
-    parser.add_argument("--rooms", type=rooms, metavar="N", help=f"number of rooms (default: {ROOMS})")
+    parser.add_argument("--rooms", type=rooms, metavar="N", help=f"number of rooms (default: {Effort.rooms})")
     parser.add_argument(
         "--seconds",
         type=time_limit,
@@ -64,9 +64,9 @@ def add_effort(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def limit(arguments: argparse.Namespace) -> float:
-    """Seconds for a scenario; 0 is no limit."""
-    return SECONDS if arguments.seconds is None else float(arguments.seconds)
+def limit(arguments: argparse.Namespace) -> float | None:
+    """Seconds for a scenario; None is no limit."""
+    return SECONDS if arguments.seconds is None else float(arguments.seconds) or None
 
 
 def refuse(arguments: argparse.Namespace, names: Iterable[str], why: str) -> None:

@@ -2,21 +2,30 @@
 
 import argparse
 import sys
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
-from socialai_dsl.cli.arguments import ROOMS, add_effort, episodes, limit, percent, positive, refuse, seed
+from socialai_dsl.analysis.effort import EPISODES, Effort
+from socialai_dsl.cli.arguments import (
+    add_effort,
+    episodes,
+    limit,
+    percent,
+    positive,
+    refuse,
+    seed,
+    typed_options,
+)
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine, json_text
 
-if TYPE_CHECKING:
-    from socialai_dsl.analysis.effort import Clock
-    from socialai_dsl.checking.loaded import LoadedScenario
-
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
-STATES: Final = 50_000
-EPISODES: Final = 200
-PARTS: Final = ("claims", "coverage", "script")
+_OF_PART: Final = {
+    "claims": ("deep", "strict", "rooms", "states"),
+    "coverage": ("agent", "episodes", "fail_under"),
+    "script": ("rooms", "states"),
+}
+"""The options that a part of the check has a use for; those that are in none of these are everybody's."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--part",
         action="append",
-        choices=PARTS,
+        choices=tuple(_OF_PART),
         dest="parts",
         help="what to check (repeatable). claims, the default: what the file claims, and whether everything can "
         "be known and can happen. coverage: what happens while agents play. script: which rooms the script of the "
@@ -48,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--states",
         type=positive,
         metavar="N",
-        help=f"for claims and script: give up on a room after N states (default: {STATES})",
+        help=f"for claims and script: give up on a room after N states (default: {Effort.states})",
     )
     parser.add_argument(
         "--agent",
@@ -77,41 +86,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check every scenario that was named; what fails is a finding. Ctrl-C ends with what is known."""
-    from socialai_dsl.analysis.check import scenarios_of
-    from socialai_dsl.analysis.effort import Clock
-    from socialai_dsl.engine.jit import load
-    from socialai_dsl.engine.kernel import serve
+    from socialai_dsl.evaluation.checks import Asked, check
 
     _refuse_what_does_not_apply(arguments)
+    given = typed_options(arguments, ("rooms", "states", "episodes"))
+    asked = Asked(
+        arguments.scenarios,
+        [part for part in _OF_PART if part in (arguments.parts or ["claims"])],
+        limit(arguments),
+        seed=arguments.seed,
+        deep=arguments.deep,
+        strict=arguments.strict,
+        agents=arguments.agent or (),
+        least=arguments.fail_under,
+        **given,
+    )
     progress = ProgressLine(sys.stderr)
-    parts = [part for part in PARTS if part in (arguments.parts or ["claims"])]
-    scenarios = [pair for name in arguments.scenarios for pair in scenarios_of(name)]
-    # Before the time begins: where the engine is not compiled yet, that takes longer than most checks.
-    load(serve)
-    clock = Clock(limit(arguments) * len(scenarios) or None, progress.show)
-    documents: list[dict[str, Any]] = []
-    ends = [Exit.GOOD]
-    for left, part in zip(range(len(parts), 0, -1), parts, strict=True):
-        own = clock.part(left)
-        if part == "claims":
-            ends.append(_claims(arguments, scenarios, own, progress, documents))
-        else:
-            ends.append((_coverage if part == "coverage" else _scripts)(arguments, own, progress, documents))
-        if clock.interrupted:
-            ends.append(Exit.INTERRUPTED)
-            break
+    found = check(asked, progress.show, None if arguments.json else progress.above(sys.stdout))
     progress.clear()
     if arguments.json:
-        print(json_text(documents))
-    return max(ends)
-
-
-_OF_PART: Final = {
-    "claims": ("deep", "strict", "rooms", "states"),
-    "coverage": ("agent", "episodes", "fail_under"),
-    "script": ("rooms", "states"),
-}
-"""The options that a part of the check has a use for; those that are in none of these are everybody's."""
+        print(json_text([result.document for result in found.results]))
+    if found.interrupted:
+        return Exit.INTERRUPTED
+    return Exit.FINDINGS if any(result.failed for result in found.results) else Exit.GOOD
 
 
 def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
@@ -122,62 +119,3 @@ def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
     for name in idle:
         fitting = " or ".join(f"--part {part}" for part, names in _OF_PART.items() if name in names)
         refuse(arguments, [name], f"it is for {fitting}, got --part {' --part '.join(parts)}")
-
-
-def _claims(
-    arguments: argparse.Namespace,
-    scenarios: "list[tuple[LoadedScenario, str]]",
-    clock: "Clock",
-    progress: ProgressLine,
-    documents: list[dict[str, Any]],
-) -> Exit:
-    from socialai_dsl.analysis.check import check_scenario
-    from socialai_dsl.analysis.effort import Effort
-
-    say = None if arguments.json else progress.above(sys.stdout)
-    end = Exit.GOOD
-    for number, (scenario, called) in enumerate(scenarios):
-        own = clock.part(len(scenarios) - number)
-        effort = Effort(arguments.rooms or ROOMS, arguments.seed, arguments.states or STATES, own)
-        report = check_scenario(scenario, called, effort, arguments.deep, say)
-        documents.append(report.as_object())
-        if report.fails(arguments.strict):
-            end = Exit.FINDINGS
-        if clock.interrupted:
-            break
-    return end
-
-
-def _coverage(
-    arguments: argparse.Namespace, clock: "Clock", progress: ProgressLine, documents: list[dict[str, Any]]
-) -> Exit:
-    from socialai_dsl.evaluation import coverage
-
-    found = coverage(
-        arguments.scenarios, arguments.agent or (), arguments.episodes or EPISODES, arguments.seed, clock
-    )
-    documents.append(found.as_object())
-    if not arguments.json:
-        progress.above(sys.stdout)("\n".join(found.lines()))
-    least = arguments.fail_under
-    return Exit.FINDINGS if least is not None and found.percent < least else Exit.GOOD
-
-
-def _scripts(
-    arguments: argparse.Namespace, clock: "Clock", progress: ProgressLine, documents: list[dict[str, Any]]
-) -> Exit:
-    """A room that can be solved and was not is a finding."""
-    from socialai_dsl.evaluation import play_script
-
-    end = Exit.GOOD
-    for number, name in enumerate(arguments.scenarios):
-        own = clock.part(len(arguments.scenarios) - number)
-        found = play_script(name, arguments.rooms or ROOMS, arguments.seed, arguments.states or STATES, own)
-        documents.append(found.as_object())
-        if not arguments.json:
-            progress.above(sys.stdout)("\n".join(found.lines()))
-        if found.found("solvable"):
-            end = Exit.FINDINGS
-        if clock.interrupted:
-            break
-    return end

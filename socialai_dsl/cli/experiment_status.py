@@ -6,7 +6,8 @@ import sys
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.experiment_tables import status_text
-from socialai_dsl.cli.terminal import counted, json_text
+from socialai_dsl.cli.terminal import json_text
+from socialai_dsl.diagnostics import counted
 from socialai_dsl.experiments import work
 from socialai_dsl.experiments.figures import status_figures
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of

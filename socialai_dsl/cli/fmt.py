@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.files import STDIN, given_files, standard_input
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, render_text
+from socialai_dsl.loader.given import STDIN, given_files, standard_input
 
 if TYPE_CHECKING:
     from socialai_dsl.source import Source

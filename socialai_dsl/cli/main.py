@@ -12,9 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from socialai_dsl.cli.errors import Exit, is_usage
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.diagnostics import ScenarioError, printable, render_text, suggested
+from socialai_dsl.diagnostics import ScenarioError, is_usage, printable, render_text, suggested
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.errors import OptionError, RunFailed, UsageError
 from trainer.config import HYPER

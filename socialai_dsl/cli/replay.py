@@ -6,7 +6,7 @@ from typing import Final
 
 from socialai_dsl.cli.arguments import episode, episodes, positive
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.terminal import counted
+from socialai_dsl.diagnostics import counted
 from socialai_dsl.runs.folder import REPLAY
 from socialai_dsl.runs.replay import PLAYED, REPLAYED, replay
 

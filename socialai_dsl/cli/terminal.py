@@ -1,4 +1,4 @@
-"""What commands print: its colours, lines that are written over, JSON, counts."""
+"""What commands print: its colours, lines that are written over, JSON."""
 
 import json
 import os
@@ -14,11 +14,6 @@ def shows_color(stream: IO[Any]) -> bool:
 def json_text(value: Any) -> str:
     """A value as the JSON that commands print."""
     return json.dumps(value, indent=2, ensure_ascii=False)
-
-
-def counted(number: int, noun: str) -> str:
-    """`1 file`, `2 files`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class ProgressLine:

@@ -2,22 +2,39 @@
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
-from socialai_dsl.cli.arguments import ROOMS, add_effort, limit, positive, refuse
-from socialai_dsl.cli.errors import Exit, is_usage
-from socialai_dsl.cli.files import STDIN, given_files, standard_input
-from socialai_dsl.cli.reporters import REPORTERS, CheckedInput, limited
+from socialai_dsl.analysis.effort import Clock, Effort
+from socialai_dsl.analysis.validation import validate
+from socialai_dsl.checking.formats import FORMATS, CheckedInput, every_finding, limited
+from socialai_dsl.cli.arguments import add_effort, limit, positive, refuse
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine, shows_color
-from socialai_dsl.diagnostics import Diagnostic, ScenarioError
-
-if TYPE_CHECKING:
-    from socialai_dsl.frontend import CheckResult
+from socialai_dsl.diagnostics import Severity, counted, render_text
+from socialai_dsl.loader.given import STDIN
 
 SUMMARY: Final = "find mistakes in scenario files without playing"
+
+
+def as_text(checked: Sequence[CheckedInput]) -> str:
+    """One block per finding with the line it points at, then a summary."""
+    diagnostics = every_finding(checked)
+    sources = {name: source for c in checked for name, source in c.sources.items()}
+    errors = sum(d.severity is Severity.ERROR for d in diagnostics)
+    hidden = any(c.left_out for c in checked)
+    counts = [counted(errors, "error") + (" shown, more left out" if hidden else "")]
+    counts.append(counted(len(diagnostics) - errors, "warning"))
+    lines = [render_text([d], sources, shows_color(sys.stdout)) for d in diagnostics]
+    lines.append(f"{counted(len(checked), 'file')} checked: {', '.join(counts)}")
+    if diagnostics:
+        code = diagnostics[0].code
+        lines.append(f"`socialai explain {code}` says more about {code}")
+    return "\n".join(lines)
+
+
+REPORTS: Final = {"text": as_text, **FORMATS}
+"""Format -> function from what was checked to what is printed."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--format",
-        choices=tuple(sorted(REPORTERS.keys() - {"json"})),
+        choices=tuple(sorted(REPORTS.keys() - {"json"})),
         default="text",
         help="format of the findings (default: text)",
     )
@@ -65,93 +82,20 @@ def execute(arguments: argparse.Namespace) -> Exit:
         refuse(
             arguments, ("stdin_filename",), "it names what is on standard input, which is read for the PATH -"
         )
-    results = [
-        _checked(name, arguments.stdin_filename or "stdin.yaml") for name in given_files(arguments.paths)
-    ]
-    checked = _without_used(results)
-    if arguments.deep:
-        right = [result for (_, result), c in zip(results, checked, strict=True) if not c.errors]
-        tried = {result.name: _tried(result, arguments) for result in right}
-        checked = [
-            replace(c, diagnostics=c.diagnostics + tried.get(result.name, ()))
-            for c, (_, result) in zip(checked, results, strict=True)
-        ]
+    progress = ProgressLine(sys.stderr)
+
+    def effort() -> Effort:
+        return Effort(arguments.rooms or Effort.rooms, clock=Clock(limit(arguments), progress.show))
+
+    say = progress.above(sys.stdout) if arguments.format == "text" else None
+    stdin_name = arguments.stdin_filename or "stdin.yaml"
+    try:
+        checked = validate(arguments.paths, stdin_name, effort if arguments.deep else None, say)
+    finally:
+        progress.clear()
     shown = checked if arguments.max_errors is None else limited(checked, arguments.max_errors)
-    report = REPORTERS[arguments.format](shown, shows_color(sys.stdout))
+    report = REPORTS[arguments.format](shown)
     if report:
         print(report)
     failed = any(c.errors or (arguments.strict and c.warnings) for c in checked)
     return Exit.FINDINGS if failed else Exit.GOOD
-
-
-def _checked(name: str, stdin_filename: str) -> tuple[CheckedInput, "CheckResult"]:
-    from socialai_dsl import frontend
-
-    if name == STDIN:
-        try:
-            texts = standard_input(stdin_filename)
-        except ScenarioError as error:  # no text at all, which is a finding in it as in a file
-            nothing = frontend.CheckResult(stdin_filename, None, None, error.diagnostics, error.sources, None)
-            return CheckedInput(stdin_filename, error.diagnostics, error.sources), nothing
-        result = frontend.check(Path(stdin_filename).absolute(), texts, every_value=True)
-        name = stdin_filename
-    else:
-        if name.endswith((".yaml", ".yml")):
-            with open(name, "rb") as file:  # raises OSError where it cannot be read: usage, not a finding
-                file.read(1)
-        result = frontend.check(name, every_value=True)
-        if result.has_errors and is_usage(result.diagnostics):
-            raise ScenarioError(result.diagnostics, result.sources)
-    found = (*result.diagnostics, *_misfits(result))
-    return CheckedInput(name, found, dict(result.sources)), result
-
-
-def _without_used(results: Iterable[tuple[CheckedInput, "CheckResult"]]) -> list[CheckedInput]:
-    """What was checked, where a comment that is idle in its own file but silences a warning in another's is fine."""
-    from socialai_dsl.frontend import UNUSED
-
-    results = list(results)
-    used = {span for _, result in results for span in result.used}
-    return [
-        replace(
-            checked,
-            diagnostics=tuple(d for d in checked.diagnostics if d.code != UNUSED or d.span not in used),
-        )
-        for checked, _ in results
-    ]
-
-
-def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagnostic, ...]:
-    """What trying the scenario of a file out shows, or the members of a suite; told to people as it goes."""
-    if result.checked is None and result.suite is None:
-        return ()
-    from socialai_dsl.analysis.check import check_scenario, scenarios_of
-    from socialai_dsl.analysis.effort import Clock, Effort
-
-    found: list[Diagnostic] = []
-    progress = ProgressLine(sys.stderr)
-    say = progress.above(sys.stdout) if arguments.format == "text" else None
-    # What was checked, also where it came from standard input.
-    texts = {source.path: source for source in result.sources.values() if source.path is not None}
-    for scenario, called in scenarios_of(result.name, texts):
-        clock = Clock(limit(arguments) or None, progress.show)
-        effort = Effort(arguments.rooms or ROOMS, clock=clock)
-        report = check_scenario(scenario, called, effort, deep=True, say=say, texts=texts)
-        progress.clear()
-        found += report.findings()
-        if report.interrupted:
-            raise KeyboardInterrupt
-    return tuple(found)
-
-
-def _misfits(result: "CheckResult") -> Iterator[Diagnostic]:
-    """What is wrong with the layouts of a suite, which only its compiled scenarios can tell."""
-    if result.suite is None or not any(result.suite.starts):
-        return
-    from socialai_dsl.compilation import compile_loaded
-    from socialai_dsl.envs.starts import check_starts
-
-    try:
-        check_starts(result.suite, compile_loaded(result.suite))
-    except ScenarioError as error:
-        yield from error.diagnostics

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.effort import Clock
+from socialai_dsl.analysis.effort import EPISODES, Clock
 from socialai_dsl.analysis.tally import Tally, TallyItem, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
@@ -30,7 +30,7 @@ _KINDS: Final = ("rule", "state", "step", "outcome")
 def coverage(
     scenarios: Sequence[str],
     agents: Sequence[str] = (),
-    episodes: int = 200,
+    episodes: int = EPISODES,
     seed: int = 0,
     clock: Clock | None = None,
 ) -> Coverage:

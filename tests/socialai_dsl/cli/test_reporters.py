@@ -5,7 +5,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from socialai_dsl.cli.reporters import REPORTERS, CheckedInput
+from socialai_dsl.checking.formats import CheckedInput
+from socialai_dsl.cli.validate import REPORTS
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.source import Source, Span
 
@@ -20,7 +21,7 @@ CHECKED = [
 
 
 def report(name: str) -> str:
-    return REPORTERS[name](CHECKED, False)
+    return REPORTS[name](CHECKED)
 
 
 def test_text_points_at_the_line_and_counts_shared_findings_once() -> None:
@@ -71,9 +72,9 @@ def test_junit_has_a_case_for_each_file() -> None:
     assert [case.find("failure") is not None for case in suite] == [True, True, False]
 
 
-@pytest.mark.parametrize("name", sorted(REPORTERS))
+@pytest.mark.parametrize("name", sorted(REPORTS))
 def test_nothing_found(name: str) -> None:
-    text = REPORTERS[name]([CheckedInput("c.yaml", (), {})], False)
+    text = REPORTS[name]([CheckedInput("c.yaml", (), {})])
     expected = {"text": "1 file checked: 0 errors, 0 warnings", "json": "[]", "github": ""}
     if name in expected:
         assert text == expected[name]

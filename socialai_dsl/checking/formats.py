@@ -1,13 +1,13 @@
-"""Prints the findings of a check for people, for tools and for code hosts."""
+"""The findings in checked files, as tools and code hosts read them."""
 
+import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from socialai_dsl.cli.terminal import counted, json_text
-from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, printable, render_text, to_json
+from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, counted, printable, render_text, to_json
 from socialai_dsl.source import Source
 
 
@@ -16,7 +16,7 @@ class CheckedInput:
     """One checked input and what was found in it, or in files it uses.
 
     Attributes:
-        name: as given on the command line.
+        name: as it was given.
         diagnostics: sorted by place.
         sources: name -> source of the files they point into.
         left_out: how many errors more there are than are to be reported.
@@ -40,7 +40,7 @@ class CheckedInput:
 
 def limited(checked: Sequence[CheckedInput], most: int) -> list[CheckedInput]:
     """The results with the first `most` errors alone; one in a file that several inputs share counts once."""
-    errors = [d for d in _all(checked) if d.severity is Severity.ERROR]
+    errors = [d for d in every_finding(checked) if d.severity is Severity.ERROR]
     hidden = set(errors[most:])
     return [
         replace(
@@ -52,34 +52,15 @@ def limited(checked: Sequence[CheckedInput], most: int) -> list[CheckedInput]:
     ]
 
 
-def report_text(checked: Sequence[CheckedInput], color: bool) -> str:
-    """One block per finding with the line it points at, then a summary."""
-    diagnostics = _all(checked)
-    sources = {name: source for c in checked for name, source in c.sources.items()}
-    errors = sum(d.severity is Severity.ERROR for d in diagnostics)
-    hidden = any(c.left_out for c in checked)
-    counts = [counted(errors, "error") + (" shown, more left out" if hidden else "")]
-    counts.append(counted(len(diagnostics) - errors, "warning"))
-    summary = f"{counted(len(checked), 'file')} checked: {', '.join(counts)}"
-    more = (
-        [f"`socialai explain {diagnostics[0].code}` says more about {diagnostics[0].code}"]
-        if diagnostics
-        else []
-    )
-    return "\n".join([*(render_text([d], sources, color) for d in diagnostics), summary, *more])
-
-
-def report_json(checked: Sequence[CheckedInput], color: bool) -> str:
+def as_json(checked: Sequence[CheckedInput]) -> str:
     """An array of findings."""
-    del color
-    return json_text(to_json(_all(checked)))
+    return _json(to_json(every_finding(checked)))
 
 
-def report_github(checked: Sequence[CheckedInput], color: bool) -> str:
+def as_github(checked: Sequence[CheckedInput]) -> str:
     """GitHub workflow commands, shown as annotations of the changed lines."""
-    del color
     lines = []
-    for d in _all(checked):
+    for d in every_finding(checked):
         place = {
             "file": printable(d.span.file),
             "line": d.span.line,
@@ -92,10 +73,9 @@ def report_github(checked: Sequence[CheckedInput], color: bool) -> str:
     return "\n".join(lines)
 
 
-def report_sarif(checked: Sequence[CheckedInput], color: bool) -> str:
+def as_sarif(checked: Sequence[CheckedInput]) -> str:
     """A SARIF 2.1.0 log."""
-    del color
-    diagnostics = _all(checked)
+    diagnostics = every_finding(checked)
     rules = [
         {"id": code, "shortDescription": {"text": CODES[code]}}
         for code in sorted({d.code for d in diagnostics})
@@ -110,12 +90,11 @@ def report_sarif(checked: Sequence[CheckedInput], color: bool) -> str:
         "version": "2.1.0",
         "runs": [run],
     }
-    return json_text(log)
+    return _json(log)
 
 
-def report_junit(checked: Sequence[CheckedInput], color: bool) -> str:
+def as_junit(checked: Sequence[CheckedInput]) -> str:
     """A JUnit XML file: one test case per checked file; warnings are its output, errors its failures."""
-    del color
     failed = sum(c.errors > 0 for c in checked)
     suite = ElementTree.Element(
         "testsuite", name="socialai validate", tests=str(len(checked)), failures=str(failed)
@@ -132,19 +111,22 @@ def report_junit(checked: Sequence[CheckedInput], color: bool) -> str:
     return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)
 
 
-REPORTERS: Final[dict[str, Callable[[Sequence[CheckedInput], bool], str]]] = {
-    "text": report_text,
-    "json": report_json,
-    "github": report_github,
-    "sarif": report_sarif,
-    "junit": report_junit,
+FORMATS: Final[dict[str, Callable[[Sequence[CheckedInput]], str]]] = {
+    "json": as_json,
+    "github": as_github,
+    "sarif": as_sarif,
+    "junit": as_junit,
 }
-"""Format -> function from what was checked, and whether to colour, to the report."""
+"""Format -> function from what was checked to the document."""
 
 
-def _all(checked: Iterable[CheckedInput]) -> list[Diagnostic]:
+def every_finding(checked: Iterable[CheckedInput]) -> list[Diagnostic]:
     """Every finding once, even where several inputs share the file it lies in."""
     return list(dict.fromkeys(d for c in checked for d in c.diagnostics))
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=2, ensure_ascii=False)
 
 
 def _with_hint(diagnostic: Diagnostic) -> str:

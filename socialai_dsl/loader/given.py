@@ -1,14 +1,13 @@
-"""Finds the files that a command is given: paths, folders, standard input."""
+"""The files that a command is given: paths, folders, standard input."""
 
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from socialai_dsl.errors import UsageError
-
-if TYPE_CHECKING:
-    from socialai_dsl.source import Source
+from socialai_dsl.loader.reader import display_name, read_stream, yaml_files_below
+from socialai_dsl.source import Source
 
 STDIN: Final = "-"
 
@@ -19,8 +18,6 @@ def given_files(paths: Iterable[str]) -> list[str]:
     Raises:
         UsageError: there is no YAML file below a folder.
     """
-    from socialai_dsl.loader.reader import yaml_files_below
-
     names: dict[str, None] = {}
     for path in paths:
         found = yaml_files_below(Path(path)) if Path(path).is_dir() else [path]
@@ -30,13 +27,11 @@ def given_files(paths: Iterable[str]) -> list[str]:
     return list(names)
 
 
-def standard_input(name: str) -> Mapping[Path, "Source"]:
+def standard_input(name: str) -> Mapping[Path, Source]:
     """The text on standard input as the text of the file called `name`, as `frontend.check` takes it.
 
     Raises:
         ScenarioError: it is too large, or no text.
     """
-    from socialai_dsl.loader.reader import display_name, read_stream
-
     path = Path(name)
     return {path.resolve(): read_stream(sys.stdin.buffer, display_name(path))}
