@@ -1,5 +1,6 @@
 """How a language model is asked: options that play, evaluation and reports share."""
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,19 +11,23 @@ from socialai_dsl.errors import OptionError
 class ModelOptions:
     """How a language model is asked.
 
+    The command line shows these meanings as help.
+
     Attributes:
-        base_url: of an OpenAI-compatible interface, up to `/v1`; None: OpenAI's.
-        key_from: the environment variable with the key.
-        style: of observations. mode: how the model gives its actions.
-        history: observations in a request; None: the whole episode.
-        temperature, max_tokens: of replies; None: the server's.
-        on_invalid: whether a reply without an action passes the turn, is asked for again, or ends the episode.
-        grammar: whether replies are held to a grammar, which llama.cpp's server can.
-        probes: whether the scenario's probes are asked apart from play, kept in later requests, or not asked.
-        concurrency: episodes played at once.
-        timeout: seconds for one reply.
-        budget: what may be spent: `200000 tokens`, or `2.50usd` with prices.
-        prices: US dollars for a million tokens of requests and of replies: `0.15,0.60`.
+        base_url: address of an OpenAI-compatible server, up to /v1 (default: OpenAI's).
+        key_from: environment variable that holds the key.
+        style: style of the observations.
+        mode: how the model gives its actions.
+        history: number of observations in a request (default: the whole episode).
+        temperature: temperature (default: the server's).
+        max_tokens: longest reply (default: the server's).
+        on_invalid: what a reply without an action does: pass the turn (default), ask again, or end the episode.
+        grammar: constrain replies by a grammar (servers of llama.cpp).
+        probes: ask the scenario's probes apart from play (default), keep them in later requests, or do not ask.
+        concurrency: number of episodes played at once.
+        timeout: time limit of one reply, seconds.
+        budget: limit of what is spent: 200000 tokens, or 2.50usd where prices are given.
+        prices: US dollars for a million tokens of requests and a million of replies.
 
     Raises:
         OptionError: replies are to be held to a grammar that have a form already.
@@ -63,3 +68,8 @@ class ModelOptions:
         }
         parts = [f"{name} {value}" for name, value in further.items() if value is not None]
         return ", ".join([f"{self.style} and {self.mode}", shown, *parts])
+
+
+def meanings() -> dict[str, str]:
+    """Option -> what `ModelOptions` says of it; nothing where Python keeps no docstrings."""
+    return dict(re.findall(r"^ {8}(\w+): (.*)\.$", ModelOptions.__doc__ or "", re.MULTILINE))

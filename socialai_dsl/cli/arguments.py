@@ -4,17 +4,12 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Final
+from typing import Any, Final, TypeVar, get_args
 
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.errors import UsageError
 
-STYLE: Final[dict[str, Any]] = {
-    "choices": ("prose", "grid", "json"),
-    "help": "style of the observations (default: prose)",
-}
-"""The option `--style`: how a language model reads observations."""
 SECONDS: Final = 20.0
 _LONGEST: Final = 366 * 24 * 3600
 _MOST: Final = 10**9
@@ -23,10 +18,60 @@ _MOST_ROOMS: Final = 100_000
 _SEEDS: Final = 2**63
 _SHOWN: Final = 40
 """The most characters of a mistyped number that a message repeats."""
+_Number = TypeVar("_Number", int, float)
 _IDENTIFIER: Final = re.compile(r"\w[\w.-]{0,63}")
 
 
 TELL_OPTIONS: Final = ("tell", "goal", "language")
+
+
+def flag(name: str) -> str:
+    """`max_tokens` as `--max-tokens`."""
+    return f"--{name.replace('_', '-')}"
+
+
+def add_declared(
+    parser: argparse._ActionsContainer, name: str, annotation: Any, about: str, default: Any, **more: Any
+) -> None:
+    """Declare the option of a field; one that is not typed is None.
+
+    Args:
+        parser: gets it.
+        name: of the field.
+        annotation: its type: of a `bool` the option is a switch, a `Literal` has the words to choose from.
+        about: what it means; unless it says so itself, the default is added.
+        default: where the field has another than None.
+        more: what argparse is told besides.
+    """
+    words = tuple(word for word in get_args(annotation) if isinstance(word, str))
+    if annotation is bool:
+        more |= {"action": "store_true", "default": None}
+    elif words:
+        more |= {"choices": words, "metavar": None}
+    if annotation is not bool and default not in (None, "none") and "(default)" not in about:
+        about += f" (default: {format(default, 'g') if isinstance(default, float) else default})"
+    aliases = more.pop("aliases", ())
+    parser.add_argument(flag(name), *aliases, dest=name, help=about.replace("%", "%%"), **more)
+
+
+def add_scenario(parser: argparse.ArgumentParser, more: str = "", **options: Any) -> None:
+    """Declare the scenario that a command is about."""
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        help=f"a path or a name, with +variants and ?parameters{more}",
+        **options,
+    )
+
+
+def add_participant(parser: argparse.ArgumentParser, whose: str = "") -> None:
+    """Declare the word that begins the name of a person's session."""
+    parser.add_argument(
+        "--participant",
+        type=identifier,
+        metavar="ID",
+        help=f"{whose}begins the name of the session's folder (default: the time alone)",
+    )
 
 
 def add_tell(parser: argparse.ArgumentParser) -> None:
@@ -83,61 +128,45 @@ def refuse(arguments: argparse.Namespace, names: Iterable[str], why: str) -> Non
     for name in sorted(names):
         value = getattr(arguments, name)
         if value is not None and value is not False and value != []:
-            raise UsageError(f"--{name.replace('_', '-')}: {why}")
+            raise UsageError(f"{flag(name)}: {why}")
 
 
-def positive(text: str) -> int:
-    """A whole number of at least 1; `1_000` and `1,000` are 1000."""
-    return _whole_number(text, 1, _MOST)
+def whole_number(text: str) -> int:
+    """A whole number, whose bounds the caller checks; `1_000` and `1,000` are 1000."""
+    try:
+        return int(text.replace("_", "").replace(",", ""))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a whole number") from None
 
 
-def rooms(text: str) -> int:
-    """How many rooms are drawn."""
-    return _whole_number(text, 1, _MOST_ROOMS)
+def whole_between(least: int, most: int) -> Callable[[str], int]:
+    """Whole numbers within bounds, as `type` of an option."""
+    return lambda text: _within(text, whole_number(text), least, most)
 
 
-def episodes(text: str) -> int:
-    """How many test episodes."""
-    return _whole_number(text, 1, MOST_EPISODES)
+def number_between(least: float, most: float) -> Callable[[str], float]:
+    """Numbers within bounds, as `type` of an option."""
+    return lambda text: _within(text, _number(text), least, most)
 
 
-def episode(text: str) -> int:
-    """The number of a test episode."""
-    return _whole_number(text, 0, MOST_EPISODES - 1)
-
-
-def at_once(text: str) -> int:
-    """How many of something at once."""
-    return _whole_number(text, 1, _MOST_AT_ONCE)
-
-
-def natural(text: str) -> int:
-    """A whole number of at least 0."""
-    return _whole_number(text, 0, _MOST)
-
-
-def seed(text: str) -> int:
-    """The seed of rooms or draws."""
-    return _whole_number(text, 0, _SEEDS - 1)
-
-
-def port(text: str) -> int:
-    """A port; 0 is any that is free."""
-    return _whole_number(text, 0, 65_535)
-
-
-def time_limit(text: str) -> float:
-    """Seconds, with a fraction perhaps; 0 is no limit."""
-    return _number(text, 0, _LONGEST)
+positive: Final = whole_between(1, _MOST)
+natural: Final = whole_between(0, _MOST)
+rooms: Final = whole_between(1, _MOST_ROOMS)
+at_once: Final = whole_between(1, _MOST_AT_ONCE)
+seed: Final = whole_between(0, _SEEDS - 1)
+port: Final = whole_between(0, 65_535)
+episodes: Final = whole_between(1, MOST_EPISODES)
+"""How many test episodes."""
+episode: Final = whole_between(0, MOST_EPISODES - 1)
+"""The number of a test episode."""
+time_limit: Final = number_between(0, _LONGEST)
+"""Seconds; 0 is no limit."""
 
 
 def seconds(text: str) -> float:
     """A time above 0; it may have a fraction."""
-    try:
-        found = time_limit(text)
-    except argparse.ArgumentTypeError:
-        found = 0
-    if found == 0:
+    found = _number(text)
+    if not 0 < found <= _LONGEST:
         raise argparse.ArgumentTypeError(
             f"expected a number of seconds above 0, at most {_LONGEST}, got {text[:_SHOWN]!r}"
         )
@@ -146,15 +175,10 @@ def seconds(text: str) -> float:
 
 def percent(text: str) -> float:
     """A number from 0 to 100."""
-    try:
-        return _number(text, 0, 100)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a per cent from 0 to 100") from None
-
-
-def number_between(least: float, most: float) -> Callable[[str], float]:
-    """A number within bounds."""
-    return lambda text: _number(text, least, most)
+    found = _number(text)
+    if not 0 <= found <= 100:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a per cent from 0 to 100")
+    return found
 
 
 def identifier(text: str) -> str:
@@ -166,34 +190,20 @@ def identifier(text: str) -> str:
     return text
 
 
-def whole_number(text: str) -> int:
-    """A whole number, whose bounds the caller checks; `1_000` and `1,000` are 1000."""
+def _number(text: str) -> float:
+    """A number; what is none is not a number, which lies within no bounds."""
     try:
-        return int(text.replace("_", "").replace(",", ""))
+        return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a whole number") from None
+        return math.nan
 
 
-def _whole_number(text: str, least: int, most: int) -> int:
-    found = whole_number(text)
-    _require_within(text, found, least, most)
-    return found
-
-
-def _number(text: str, least: float, most: float) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    _require_within(text, found, least, most)
-    return found
-
-
-def _require_within(text: str, found: float, least: float, most: float) -> None:
+def _within(text: str, found: _Number, least: float, most: float) -> _Number:
     if not found >= least:  # so that what is not a number is refused as well
         raise argparse.ArgumentTypeError(f"got {_short(text)}, expected at least {least}")
     if found > most:
         raise argparse.ArgumentTypeError(f"got {_short(text)}, expected at most {most}")
+    return found
 
 
 def _short(text: str) -> str:

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from socialai_dsl.cli.arguments import (
     TELL_OPTIONS,
+    add_participant,
     add_tell,
     episodes,
-    identifier,
     natural,
     positive,
     seed,
@@ -84,12 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="number of episodes in a row that the agent remembers, with results by trial (default: 1)",
     )
-    parser.add_argument(
-        "--participant",
-        type=identifier,
-        metavar="ID",
-        help="for the agent human: begins the name of the session's folder (default: the time alone)",
-    )
+    add_participant(parser, "for the agent human: ")
     parser.add_argument(
         "--view",
         choices=("seat", "room"),

@@ -9,14 +9,16 @@ import traceback
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
+from socialai_dsl.cli.arguments import flag
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, is_usage, printable, render_text, suggested
 from socialai_dsl.engine.calls import RoomError
-from socialai_dsl.errors import OptionError, RunFailed, UsageError
+from socialai_dsl.errors import OptionError, RunFailed, UsageError, described_error
 from trainer.config import HYPER
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
@@ -36,7 +38,7 @@ _COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
-    words = sys.argv[1:] if argv is None else argv
+    words = list(sys.argv[1:] if argv is None else argv)
     # Loading all commands doubles the time to start; the others are needed for their summaries alone.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
     modules = {name: import_module(f"socialai_dsl.cli.{name}") for name in named}
@@ -47,17 +49,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         epilog=_overview(modules) if named is _COMMANDS else None,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action=_Version)
-    parser.add_argument("--print-completion", action=_Completion)
+    _add_version(parser, words)
+    parser.add_argument(
+        "--print-completion",
+        choices=("bash", "zsh", "fish"),
+        metavar="SHELL",
+        help="print a completion script for bash, zsh or fish, and exit",
+    )
+    # What is done without a command, which has its own `execute`.
+    parser.set_defaults(execute=lambda typed: _print_completion(parser, typed.print_completion), debug=False)
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", prog="socialai", help=argparse.SUPPRESS
     )
     for name, module in modules.items():
         command = commands.add_parser(name, help=module.SUMMARY, description=_sentence(module.SUMMARY))
-        module.add_arguments(command)
-        command.set_defaults(execute=module.execute)
-        _add_debug(command)
-    if not words:
+        _add_command(command, module)
+    if words in ([], ["--"]):
         parser.print_help()
         return Exit.GOOD
     return _guarded(parser, words)
@@ -86,10 +93,8 @@ def run_alone(program: str, module: Any, argv: Sequence[str] | None = None) -> i
         argv: what was typed (default: `sys.argv`).
     """
     parser = _Parser(prog=program, description=_sentence(module.SUMMARY))
-    parser.add_argument("--version", action=_Version)
-    module.add_arguments(parser)
-    parser.set_defaults(execute=module.execute)
-    _add_debug(parser)
+    _add_version(parser, sys.argv[1:] if argv is None else argv)
+    _add_command(parser, module)
     return _guarded(parser, argv)
 
 
@@ -97,7 +102,16 @@ def _sentence(summary: str) -> str:
     return summary[0].upper() + summary[1:] + "."
 
 
-def _add_debug(parser: argparse.ArgumentParser) -> None:
+def _add_version(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
+    # Looked up only when asked for, because the look-up reads the disk.
+    asked = any(word.startswith("--v") for word in words)
+    shown = f"{parser.prog} {version('socialai-dsl')}" if asked else ""
+    parser.add_argument("--version", action="version", version=shown, help="show the version and exit")
+
+
+def _add_command(parser: argparse.ArgumentParser, module: Any) -> None:
+    module.add_arguments(parser)
+    parser.set_defaults(execute=module.execute)
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
@@ -141,26 +155,30 @@ def _explain(program: str, error: Exception) -> Exit:
         print(render_text(error.diagnostics, error.sources, color=shows_color(sys.stderr)), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, OptionError):
-        option = f"hyper {error.name}" if error.name in HYPER else error.name.replace("_", "-")
-        error = UsageError(f"--{option}: {error.said}")
-    if isinstance(error, UsageError | RunFailed | RoomError):
-        print(f"{program}: {printable(str(error))}", file=sys.stderr)
-        if isinstance(error, UsageError):
-            return Exit.USAGE
-        return Exit.STOPPED if isinstance(error, RunFailed) else Exit.FINDINGS
-    if isinstance(error, MemoryError):
-        print(f"{program}: this machine has too little memory for what was asked", file=sys.stderr)
-        return Exit.USAGE
-    if isinstance(error, OSError):
-        place = f": {error.filename}" if error.filename is not None else ""
-        print(printable(f"{program}: {error.strerror or error}{place}"), file=sys.stderr)
-        return Exit.USAGE
+        option = f"--hyper {error.name}" if error.name in HYPER else flag(error.name)
+        error = UsageError(f"{option}: {error.said}")
+    for kind, end in _ENDS.items():
+        if isinstance(error, kind):
+            lacking = "this machine has too little memory for what was asked"
+            said = lacking if kind is MemoryError else described_error(error)
+            print(f"{program}: {printable(said)}", file=sys.stderr)
+            return end
     print(
         f"{program}: internal error, {type(error).__name__}: {printable(str(error))}\n"
         "This is a bug. Please report it with the command and the scenario; --debug shows the traceback.",
         file=sys.stderr,
     )
     return Exit.INTERNAL
+
+
+_ENDS: Final[dict[type[Exception], Exit]] = {
+    UsageError: Exit.USAGE,
+    OSError: Exit.USAGE,
+    MemoryError: Exit.USAGE,
+    RoomError: Exit.FINDINGS,
+    RunFailed: Exit.STOPPED,
+}
+"""What is no mistake of ours -> how the command ends."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -179,53 +197,17 @@ class _Parser(argparse.ArgumentParser):
         super().error(printable(message))
 
 
-class _Version(argparse.Action):
-    """Print the version; looked up only when asked for, because the look-up reads the disk."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
-        super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: object,
-        option_string: str | None = None,
-    ) -> None:
-        from importlib.metadata import version
-
-        print(f"{parser.prog} {version('socialai-dsl')}")
-        parser.exit(Exit.GOOD)
-
-
-class _Completion(argparse.Action):
+def _print_completion(parser: argparse.ArgumentParser, shell: str) -> Exit:
     """Print a script that lets a shell complete commands, options and their values."""
+    import shtab
 
-    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
-        super().__init__(
-            option_strings,
-            dest,
-            choices=("bash", "zsh", "fish"),
-            metavar="SHELL",
-            help="print a completion script for bash, zsh or fish, and exit",
-        )
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: object,
-        option_string: str | None = None,
-    ) -> None:
-        import shtab
-
-        for action in _actions(parser):
-            if isinstance(action, argparse._SubParsersAction):
-                action.help = None  # `--help` lists the commands in groups instead
-            if action.type is Path or (action.metavar in _FILES_OR_NAMES and action.choices is None):
-                action.complete = shtab.FILE  # type: ignore[attr-defined]
-        print(shtab.complete(parser, shell=str(values)))
-        parser.exit(Exit.GOOD)
+    for action in _actions(parser):
+        if isinstance(action, argparse._SubParsersAction):
+            action.help = None  # `--help` lists the commands in groups instead
+        if action.type is Path or (action.metavar in _FILES_OR_NAMES and action.choices is None):
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(parser, shell=shell))
+    return Exit.GOOD
 
 
 _FILES_OR_NAMES: Final = ("SCENARIO", "PATH", "FILE", "RUN", "CODE|SCENARIO", "RUN|SCENARIO|TRACES")

@@ -7,7 +7,14 @@ from typing import Any, Final
 
 import socialai_dsl
 from socialai_dsl.checking.briefing import brief
-from socialai_dsl.cli.arguments import TELL_OPTIONS, add_tell, identifier, seed, typed_options
+from socialai_dsl.cli.arguments import (
+    TELL_OPTIONS,
+    add_participant,
+    add_scenario,
+    add_tell,
+    seed,
+    typed_options,
+)
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.episodes.players import HUMAN_FOLDER, session_folder
@@ -18,9 +25,7 @@ SUMMARY: Final = "play a scenario in the terminal"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument(
-        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
-    )
+    add_scenario(parser)
     parser.add_argument(
         "--seed",
         type=seed,
@@ -35,12 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder that gets a folder of this session with every step (default: {HUMAN_FOLDER})",
     )
-    parser.add_argument(
-        "--participant",
-        type=identifier,
-        metavar="ID",
-        help="begins the name of the session's folder (default: the time alone)",
-    )
+    add_participant(parser)
     parser.add_argument(
         "--view",
         choices=("room", "seat"),

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.atomic import read_json
+from socialai_dsl.cli.arguments import add_scenario
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.run_options import add_options, typed_options
+from socialai_dsl.cli.run_options import add_options, given_options
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.folder import REPLAY, Run
@@ -17,9 +18,7 @@ SUMMARY: Final = "train an agent on a scenario, test it, and write pictures and 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument(
-        "scenario", nargs="?", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
-    )
+    add_scenario(parser, nargs="?")
     add_options(parser)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<scenario>/<time>-s<seed>)"
@@ -47,7 +46,7 @@ def _run(arguments: argparse.Namespace) -> Run:
     from socialai_dsl.cli.progress import RunProgress
     from socialai_dsl.runs.train import resume, train
 
-    options, scenario = typed_options(arguments), arguments.scenario
+    options, scenario = given_options(arguments), arguments.scenario
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
     if arguments.config is not None:

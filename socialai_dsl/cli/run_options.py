@@ -4,9 +4,9 @@ import argparse
 import json
 from collections.abc import Sequence
 from reprlib import repr as shortened
-from typing import Any, get_args
+from typing import Any, Literal
 
-from socialai_dsl.cli.arguments import whole_number
+from socialai_dsl.cli.arguments import add_declared, flag, typed_options, whole_number
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.options import AUTOMATIC
@@ -17,17 +17,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Declare a flag for each option of `RunConfig` that has one, `--recipe` and `--hyper`."""
     for name in FLAGS:
         field = RunConfig.model_fields[name]
-        words = [f"--{name.replace('_', '-')}"] + (["--explo"] if name == "bonus" else [])
-        default = AUTOMATIC.get(name, field.default)
-        about = (
-            field.description if default in (None, "none") else f"{field.description} (default: {default})"
-        )
-        choices = ("auto", "cpu", "cuda") if name == "device" else _choices(field.annotation)
         number = field.annotation is int
-        metavar = None if choices else "N" if number else "NAME"
-        kind: Any = whole_number if number else str
-        parser.add_argument(
-            *words, dest=name, type=kind, choices=choices, metavar=metavar, help=_escaped(about)
+        add_declared(
+            parser,
+            name,
+            Literal["auto", "cpu", "cuda"] if name == "device" else field.annotation,
+            field.description or "",
+            AUTOMATIC.get(name, field.default),
+            aliases=["--explo"] if name == "bonus" else [],
+            type=whole_number if number else str,
+            metavar="N" if number else "NAME",
         )
     parser.add_argument(
         "--recipe",
@@ -44,19 +43,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _choices(annotation: Any) -> tuple[str, ...] | None:
-    words = tuple(word for word in get_args(annotation) if isinstance(word, str))
-    return words or None
-
-
-def _escaped(text: str | None) -> str:
-    return (text or "").replace("%", "%%")
-
-
-def typed_options(arguments: argparse.Namespace) -> dict[str, Any]:
+def given_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """The options that were typed, by name."""
-    given = {name: getattr(arguments, name) for name in (*FLAGS, "recipe")}
-    return {name: value for name, value in given.items() if value is not None} | _read_hyper(arguments.hyper)
+    return typed_options(arguments, (*FLAGS, "recipe")) | _read_hyper(arguments.hyper)
 
 
 def _read_hyper(given: Sequence[str]) -> dict[str, Any]:
@@ -67,7 +56,7 @@ def _read_hyper(given: Sequence[str]) -> dict[str, Any]:
         if not equals or not written:
             raise UsageError(f"--hyper: got {text!r}, expected NAME=VALUE, such as lr=1e-4")
         if name in FLAGS:
-            raise UsageError(f"--hyper: {name} has an option of its own, --{name.replace('_', '-')}")
+            raise UsageError(f"--hyper: {name} has an option of its own, {flag(name)}")
         if name not in HYPER:
             hint = suggested(name, HYPER, f"; expected one of {', '.join(HYPER)}")
             raise UsageError(f"--hyper: got {name!r}{hint}")

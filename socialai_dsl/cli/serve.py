@@ -7,8 +7,17 @@ from importlib.util import find_spec
 from typing import Final
 
 from socialai_dsl.checking.briefing import brief
-from socialai_dsl.cli.arguments import STYLE, TELL_OPTIONS, add_tell, port, positive, seconds, typed_options
+from socialai_dsl.cli.arguments import (
+    TELL_OPTIONS,
+    add_scenario,
+    add_tell,
+    port,
+    positive,
+    seconds,
+    typed_options,
+)
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.model_options import add_option
 from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "serve a scenario to programs that train language models"
@@ -16,9 +25,7 @@ SUMMARY: Final = "serve a scenario to programs that train language models"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument(
-        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
-    )
+    add_scenario(parser)
     parser.add_argument(
         "--protocol",
         choices=("openenv",),
@@ -39,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=port, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
-    parser.add_argument("--style", **STYLE)
+    add_option(parser, "style")
     add_tell(parser)
     parser.add_argument(
         "--sessions",

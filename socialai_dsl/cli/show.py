@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.cli.arguments import add_scenario
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 
@@ -16,11 +17,7 @@ SUMMARY: Final = "print a scenario after `extends` and variants, or its compiled
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument(
-        "scenario",
-        metavar="SCENARIO",
-        help="a path or a name, with +variants and ?parameters; without --program also any other file of the language",
-    )
+    add_scenario(parser, "; without --program also any other file of the language")
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--program", action="store_true", help="print the compiled program")
     choice.add_argument("--origin", action="store_true", help="print the file and line of each value")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.arguments import episode, natural, positive, refuse, seed
+from socialai_dsl.cli.arguments import add_scenario, episode, natural, positive, refuse, seed
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Steps, Text
@@ -19,9 +19,7 @@ SUMMARY: Final = "print one episode step by step: the rules that fired, and why 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument(
-        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
-    )
+    add_scenario(parser)
     parser.add_argument(
         "--seed",
         type=seed,

@@ -14,7 +14,7 @@ from PIL import Image
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.run import add_arguments
-from socialai_dsl.cli.run_options import typed_options
+from socialai_dsl.cli.run_options import given_options
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.folder import Run
 from socialai_dsl.runs.options import new_config, usual_options
@@ -217,7 +217,7 @@ def test_the_automatic_bonus_is_the_paper_s() -> None:
     found = {}
     for name in BONUSES:
         typed = [name, "--bonus", "auto", "--recipe", "plain", "--device", "cpu"]
-        config = new_config(name, typed_options(parser.parse_args(typed)), socialai_dsl.load(name))
+        config = new_config(name, given_options(parser.parse_args(typed)), socialai_dsl.load(name))
         found[name] = (config.bonus, config.bonus_c)
     assert found == BONUSES
 
