@@ -63,7 +63,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "library": (TEXT_SIDE - {"frontend", "checking"}, {"pydantic"}),
     "checking": (TEXT_SIDE - {"frontend"} | {"errors"}, {SHIPPED}),
     "frontend": (TEXT_SIDE, set()),
-    "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
+    "authoring": (TEXT_SIDE | {"errors"}, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "vocabulary", "widths"}, {"numpy"}),
     "program_suite": ({"program", "vocabulary"}, set()),
     "compiler": (

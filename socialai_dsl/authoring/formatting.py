@@ -7,14 +7,18 @@ lines follow each other. Texts, quotes and line breaks stay as they are written.
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import yaml
 
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import YAML, read_document
+from socialai_dsl.loader.given import STDIN, standard_input
+from socialai_dsl.loader.reader import YAML, decoded, display_name, read_document, read_source
 from socialai_dsl.source import Node, Source
 
 _INDENT: Final = 2
@@ -22,6 +26,36 @@ _BREAK: Final = re.compile(r"\r\n|\r")
 _WHITE: Final = " \t"
 """What YAML takes for blanks; other white space is text."""
 _SPACE: Final = _WHITE + "\n"
+
+
+class Formatting(NamedTuple):
+    """A file, and its text in the house style; whether that changes it on the disk."""
+
+    source: Source
+    text: str
+    changes: bool
+
+    def diff(self) -> Iterator[str]:
+        """The changes of its lines."""
+        old, new = (text.splitlines(keepends=True) for text in (self.source.text, self.text))
+        return difflib.unified_diff(old, new, self.source.name, self.source.name)
+
+
+def formatted_file(name: str) -> Formatting:
+    """Format a file, or what is on standard input for the name `-`; nothing is written.
+
+    Raises:
+        ScenarioError: it cannot be read, or is not YAML as the language has it.
+    """
+    if name == STDIN:
+        (source,) = standard_input("stdin.yaml").values()
+        original = source.text.encode()
+    else:
+        read_source(Path(name))  # says what is wrong with what is no file, or too large to be one
+        original = Path(name).read_bytes()
+        source = decoded(original, display_name(Path(name)))
+    text = formatted(source)
+    return Formatting(source, text, text.encode() != original)
 
 
 def formatted(source: Source) -> str:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.diagnostics import CODES, suggested
-from socialai_dsl.errors import UsageError
+from socialai_dsl.diagnostics import CODES
+from socialai_dsl.loader.pages import page_of
 
 SUMMARY: Final = "explain the code of a finding, or describe a scenario"
 
@@ -30,25 +30,10 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if subject is None:
         print("\n".join(f"{code}  {title}" for code, title in CODES.items()))
     elif _CODE.fullmatch(subject) and not Path(subject).exists():
-        print(_page(subject), end="")
+        print(page_of(subject), end="")
     else:
         import socialai_dsl
         from socialai_dsl.analysis.data_sheet import sheet
 
         print(sheet(subject, socialai_dsl.load(subject)), end="")
     return Exit.GOOD
-
-
-def _page(typed: str) -> str:
-    code = typed.upper()
-    if code not in CODES:
-        hint = suggested(code, CODES, "; `socialai explain` lists all codes")
-        raise UsageError(f"CODE: there is no {typed!r}{hint}")
-    return (pages_folder() / f"{code}.md").read_text(encoding="utf-8")
-
-
-def pages_folder() -> Path:
-    """The folder with a page for each code, in a checkout as well as installed."""
-    package = Path(__file__).resolve().parent.parent
-    installed = package / "pages"
-    return installed if installed.is_dir() else package.parent / "docs" / "diagnostics"

@@ -1,19 +1,15 @@
 """`socialai fmt`: rewrites scenario files in one style, keeping their meaning and comments."""
 
 import argparse
-import difflib
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, render_text
-from socialai_dsl.loader.given import STDIN, given_files, standard_input
-
-if TYPE_CHECKING:
-    from socialai_dsl.source import Source
+from socialai_dsl.loader.given import STDIN, given_files
 
 SUMMARY: Final = "format scenario files; comments stay"
 
@@ -52,31 +48,16 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _format(name: str, check: bool, diff: bool) -> bool:
     """Format one file; whether that changes it."""
-    from socialai_dsl.authoring.formatting import formatted
+    from socialai_dsl.authoring.formatting import formatted_file
 
-    source, original = _read(name)
-    text = formatted(source)
-    changes = text.encode() != original
-    if diff and changes:
-        old, new = (t.splitlines(keepends=True) for t in (source.text, text))
-        sys.stdout.writelines(difflib.unified_diff(old, new, source.name, source.name))
+    found = formatted_file(name)
+    if diff and found.changes:
+        sys.stdout.writelines(found.diff())
     if not check and not diff:
         if name == STDIN:
-            sys.stdout.write(text)
-        elif changes:
-            write_text(Path(name).resolve(), text)  # a link stays a link
-    elif check and changes and not diff:
-        print(source.name)
-    return changes
-
-
-def _read(name: str) -> tuple["Source", bytes]:
-    """A file as text and as it is on the disk."""
-    from socialai_dsl.loader.reader import decoded, display_name, read_source
-
-    if name == STDIN:
-        (source,) = standard_input("stdin.yaml").values()
-        return source, source.text.encode()
-    read_source(Path(name))  # says what is wrong with what is no file, or too large to be one
-    original = Path(name).read_bytes()
-    return decoded(original, display_name(Path(name))), original
+            sys.stdout.write(found.text)
+        elif found.changes:
+            write_text(Path(name).resolve(), found.text)  # a link stays a link
+    elif check and found.changes and not diff:
+        print(found.source.name)
+    return found.changes

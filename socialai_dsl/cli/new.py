@@ -1,18 +1,14 @@
 """`socialai new`: writes a commented scenario to start from, with a script that solves it."""
 
 import argparse
-import re
-from pathlib import Path
 from typing import Final
 
-from socialai_dsl.authoring.templates import SCHEMA, TEMPLATES, template_files
+from socialai_dsl.authoring.templates import TEMPLATES, write_template
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
-
-_WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,31 +36,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
         return Exit.GOOD
     if arguments.name is None:
         raise UsageError("expected a NAME, or --list")
-    name = arguments.name.removesuffix(".yaml")
-    if not _WORD.fullmatch(name):
-        raise UsageError(
-            f"NAME: expected letters, digits and underscores (at most 40), got {arguments.name!r}"
-        )
-    files = template_files(arguments.template or "ask-a-guide", name)
-    for path in files:
-        if path.exists() or path.is_symlink():
-            raise UsageError(f"{path} exists already")
-    for path, text in files.items():
-        with open(path, "x", encoding="utf-8") as file:
-            file.write(text)
-    _write_schema(Path(SCHEMA))
-    print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {name}.yaml")
-    print(f"play with: socialai play {name}.yaml")
-    print(f"see it while you write: socialai studio {name}.yaml")
+    files = write_template(arguments.template or "ask-a-guide", arguments.name)
+    print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {files[0]}")
+    print(f"play with: socialai play {files[0]}")
+    print(f"see it while you write: socialai studio {files[0]}")
     return Exit.GOOD
-
-
-def _write_schema(path: Path) -> None:
-    """Put the schema where the files say it is; one that is there stays."""
-    from socialai_dsl.authoring.language_schema import shipped_schema
-
-    try:
-        with open(path, "x", encoding="utf-8") as file:
-            file.write(shipped_schema())
-    except FileExistsError:
-        pass

@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import secrets
 import webbrowser
 from pathlib import Path
 from typing import Final
@@ -10,7 +9,6 @@ from typing import Final
 from socialai_dsl.cli.arguments import at_once, natural
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
-from socialai_dsl.loader.reader import SUFFIXES
 from socialai_dsl.studio import FIRST_PORT, MOST_WINDOWS
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
@@ -55,44 +53,23 @@ def execute(arguments: argparse.Namespace) -> Exit:
         import websockets  # noqa: F401
     except ImportError as error:
         raise UsageError(f"the studio needs {error.name}: pip install 'socialai-dsl[studio]'") from None
-    from socialai_dsl.studio.address import Address, listen, remember, remembered
+    from socialai_dsl.studio.address import taken
+    from socialai_dsl.studio.files import opened
     from socialai_dsl.studio.server import LARGEST_FRAME, Studio
 
-    root, opened = _opened(arguments.path)
-    former = remembered(root, arguments.host)
-    listening = listen(arguments.host, arguments.port, former.port if former else None)
-    port, token = listening.getsockname()[1], former.token if former else secrets.token_urlsafe(24)
-    remember(root, arguments.host, Address(token=token, port=port))
-    shown = "127.0.0.1" if arguments.host in ("0.0.0.0", "::") else arguments.host
-    address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/?token={token}"
+    root, first = opened(arguments.path)
+    place = taken(root, arguments.host, arguments.port)
+    address = place.url(arguments.host)
     print(f"studio of {root}: {address}\nCtrl-C ends it", flush=True)
     if not arguments.no_browser and not _open(address):
         print("no browser could be opened; open the address yourself", flush=True)
-    studio = Studio(root, opened, token, arguments.host, arguments.windows)
+    studio = Studio(root, first, place.token, arguments.host, arguments.windows)
     config = uvicorn.Config(
         studio.app, log_level="error", ws="websockets-sansio", ws_max_size=LARGEST_FRAME, access_log=False
     )
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[listening])
+        uvicorn.Server(config).run(sockets=[place.listening])
     return Exit.GOOD
-
-
-def _opened(path: Path) -> tuple[Path, str]:
-    """The folder to open, and the file in it to show first.
-
-    Raises:
-        UsageError: there is nothing there, or something else.
-    """
-    try:
-        if path.is_dir():
-            list(path.iterdir())
-            return path.resolve(), ""
-        if path.is_file() and path.suffix in SUFFIXES:
-            return path.resolve().parent, path.name
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror}") from None
-    what = f"{path} is no scenario's file" if path.exists() else f"there is no {path}"
-    raise UsageError(f"{what}; expected a folder, or a file that ends in .yaml")
 
 
 def _open(address: str) -> bool:

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -10,7 +9,6 @@ from socialai_dsl.cli.arguments import add_scenario, episode, natural, positive,
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Steps, Text
-from socialai_dsl.diagnostics import suggested
 from socialai_dsl.episodes.traces import TracedEpisode, reset_of
 from socialai_dsl.errors import UsageError
 
@@ -83,7 +81,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
     played = TracedEpisode(arguments.scenario, arguments.agent, arguments.do, drawn)
     try:
-        _check_names(arguments.why, played.names())
+        played.require_names(arguments.why)
         last = None if arguments.steps is None else arguments.first + arguments.steps - 1
         if arguments.json:
             steps = Steps()
@@ -96,12 +94,3 @@ def execute(arguments: argparse.Namespace) -> Exit:
     finally:
         played.close()
     return Exit.GOOD
-
-
-def _check_names(asked: Sequence[str], cast: Sequence[str]) -> None:
-    known = [*cast, "world", "outcome"]
-    groups = {name.partition("[")[0] for name in cast}
-    for name in asked:
-        if name not in known and name not in groups:
-            hint = suggested(name, known, f"; expected one of {', '.join(known)}", repr)
-            raise UsageError(f"--why: got {name!r}{hint}")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import about_of
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Step, play
@@ -21,7 +22,7 @@ from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of,
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.traces.document import Outcome, Thought, Trace
 from socialai_dsl.traces.endings import endings_of
@@ -255,11 +256,20 @@ class TracedEpisode:
         except ValueError as error:
             raise UsageError(str(error)) from error
 
-    def names(self) -> tuple[str, ...]:
-        """The agent and the NPCs of everything that may be played."""
+    def require_names(self, asked: Iterable[str]) -> None:
+        """See that these are members of the cast, or groups of it, `world` or `outcome`.
+
+        Raises:
+            OptionError: one of them is not.
+        """
         program = self._env.program
         programs = getattr(program, "programs", (program,))
-        return tuple(dict.fromkeys(name for one in programs for name in cast_of(one)))
+        cast = dict.fromkeys(name for one in programs for name in cast_of(one))
+        known, groups = [*cast, "world", "outcome"], {name.partition("[")[0] for name in cast}
+        for name in asked:
+            if name not in known and name not in groups:
+                hint = suggested(name, known, f"; expected one of {', '.join(known)}", repr)
+                raise OptionError("why", f"got {name!r}{hint}")
 
     def origin(self) -> str:
         """Which episode it is, in words."""

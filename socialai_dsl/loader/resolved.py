@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant
@@ -569,6 +569,17 @@ class ResolvedFile:
         files = self._library.matching(node.value, _folder(node), span)
         names = [ScenarioName(NamePart(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._library, f, n, span) for f, n in zip(files, names, strict=True))
+
+    def origins(self) -> Iterator[tuple[Span, DataPath, Any]]:
+        """Where each value that is no container is written, its path, and itself; also in files that are drawn from.
+
+        Raises:
+            ScenarioError: see `with_drawn_files`.
+        """
+        whole = self.with_drawn_files() if self.kind == "scenario" else self
+        for path, part in whole.tree.walk():
+            if not part.children:
+                yield part.value_span(), path, part.data
 
     def with_drawn_files(self) -> ResolvedFile:
         """This scenario with the npc files that each `one_of` of its cast names put in the place of their names.

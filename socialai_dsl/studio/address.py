@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import secrets
 import socket
 import stat
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -27,6 +28,32 @@ class Address(BaseModel):
 
     token: Annotated[str, Field(pattern="^[A-Za-z0-9_-]{32}$")]
     port: Annotated[int, Field(ge=1, lt=1 << 16)]
+
+
+class Place(NamedTuple):
+    """Where a studio listens: the socket, and what a page has to know."""
+
+    listening: socket.socket
+    token: str
+
+    def url(self, host: str) -> str:
+        """The page, as a browser on this machine finds it."""
+        shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        port = self.listening.getsockname()[1]
+        return f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/?token={self.token}"
+
+
+def taken(root: Path, host: str, port: int | None) -> Place:
+    """Listen for a folder's studio, at the address that it had before where nothing else is asked for.
+
+    Raises:
+        OptionError: see `listen`.
+    """
+    former = remembered(root, host)
+    listening = listen(host, port, former.port if former else None)
+    token = former.token if former else secrets.token_urlsafe(24)
+    remember(root, host, Address(token=token, port=listening.getsockname()[1]))
+    return Place(listening, token)
 
 
 def remembered(root: Path, host: str) -> Address | None:

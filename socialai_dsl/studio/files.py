@@ -15,6 +15,7 @@ from typing import Final
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import FORBIDDEN, MAX_FILE_BYTES, SUFFIXES, read_source
 from socialai_dsl.studio.drafts import Draft, Drafts, new_window
 from trainer.shipped import PREFIX, shipped_agents
@@ -279,6 +280,24 @@ class Folder:
         except FileError:
             return False
         return True
+
+
+def opened(path: Path) -> tuple[Path, str]:
+    """The folder that a path asks for, and the file in it to show first; empty for a folder alone.
+
+    Raises:
+        UsageError: there is nothing there, or something else.
+    """
+    try:
+        if path.is_dir():
+            list(path.iterdir())
+            return path.resolve(), ""
+        if path.is_file() and path.suffix in SUFFIXES:
+            return path.resolve().parent, path.name
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from None
+    what = f"{path} is no scenario's file" if path.exists() else f"there is no {path}"
+    raise UsageError(f"{what}; expected a folder, or a file that ends in .yaml")
 
 
 def name_problem(name: str) -> str | None:
