@@ -8,10 +8,9 @@ from typing import Final
 from socialai_dsl.cli import report
 from socialai_dsl.cli.arguments import positive
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.experiments.engines import ENGINES
 
 SUMMARY: Final = "plan, run and watch the runs that an experiment file declares"
-
-ENGINES: Final = ("local", "ray", "slurm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +61,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         "--measure", action="store_true", help="measure the speed of networks whose speed is not known"
     )
     parser.add_argument("--json", action="store_true", help="print a JSON object")
-    parser.set_defaults(act=("experiment_plan", "plan"))
+    parser.set_defaults(act=("experiment_status", "plan"))
 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:

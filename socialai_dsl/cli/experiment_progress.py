@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from socialai_dsl.cli.experiment_tables import clock
-from socialai_dsl.experiments.figures import seconds_left
+from socialai_dsl.experiments.figures import at_work, seconds_left
 from socialai_dsl.experiments.folder import PlannedRun
 
 _SECONDS_BETWEEN_LINES: Final = 30.0
@@ -25,14 +25,18 @@ _OTHER_LINES: Final = 4
 
 
 class RunsProgress:
-    """Reports ends of runs, and how far those at work are; use it in a `with` statement."""
+    """Reports ends of runs, and how far those at work are; use it in a `with` statement.
+
+    Attributes:
+        ends: how many runs have come to which end.
+    """
 
     def __init__(self, runs: Sequence[PlannedRun], stream: IO[str]) -> None:
         """Report on `runs`, writing to `stream`."""
         self._all = runs
         self._left = {run.id: run for run in runs}
         self._stream = stream
-        self._ends: Counter[str] = Counter()
+        self.ends: Counter[str] = Counter()
         self._failures: list[str] = []
         self._began = time.monotonic()
         self._looked = self._estimated = float("-inf")
@@ -55,11 +59,11 @@ class RunsProgress:
 
     def ended(self, run: PlannedRun, outcome: str, message: str) -> None:
         """Report that a run has come to its end."""
-        self._ends[outcome] += 1
+        self.ends[outcome] += 1
         self._left.pop(run.id, None)
         if outcome == "failed":
             self._failures.append(f"{run.label}: {message}")
-        line = f"[{self._ends.total()}/{len(self._all)}] {run.label}: {outcome}"
+        line = f"[{self.ends.total()}/{len(self._all)}] {run.label}: {outcome}"
         line += f"  success {_success(run)}" if outcome == "done" else ""
         line += f": {message}" if message else ""
         if self._live is not None:
@@ -76,44 +80,35 @@ class RunsProgress:
                 self._live.update(self._picture(self._live.console.height))
         elif now - self._wrote > _SECONDS_BETWEEN_LINES:
             self._wrote = now
-            at_work = self._at_work()
-            runs = ", ".join(f"{run.label} {share:.0%}" for run, share, _ in at_work[:4])
-            more = f", and {len(at_work) - 4} more" if len(at_work) > 4 else ""
-            print(f"{self._sum(len(at_work))}; at work: {runs}{more}", file=self._stream, flush=True)
-
-    def _at_work(self) -> list[tuple[PlannedRun, float, float | None]]:
-        """Runs that a process works on, here or elsewhere: how far each is, and its last frames per second."""
-        found = []
-        for run in self._left.values():
-            if run.shown_status.state != "running":
-                continue
-            row = run.last_metrics or {}
-            wanted = run.condition["frames"] or 1
-            found.append((run, min(1.0, row.get("frames", 0) / wanted), row.get("frames_per_second")))
-        return found
+            working = at_work(self._left.values())
+            runs = ", ".join(f"{one.run.label} {one.share:.0%}" for one in working[:4])
+            more = f", and {len(working) - 4} more" if len(working) > 4 else ""
+            print(f"{self._sum(len(working))}; at work: {runs}{more}", file=self._stream, flush=True)
 
     def _picture(self, height: int) -> Group:
         """A line for each run at work, the last failures, which stay in sight, and the sum, on a screen so high."""
-        at_work = self._at_work()
+        working = at_work(self._left.values())
         failures = [Text(line, style="red", overflow="ellipsis", no_wrap=True) for line in self._failures]
         table = Table.grid(padding=(0, 2))
         room = max(1, height - _OTHER_LINES - min(len(failures), _FAILURES_SHOWN))
-        for run, share, speed in at_work[:room]:
+        for one in working[:room]:
+            speed, seconds = one.speed, one.seconds_left
             shown = f"{speed:,.0f} frames/s" if speed else ""
-            left = clock(run.condition["frames"] * (1 - share) / speed) + " left" if speed else ""
-            left = "testing" if share == 1.0 else left
-            table.add_row(Text(run.label), ProgressBar(1.0, share, width=28), f"{share:4.0%}", shown, left)
-        return Group(table, *failures[-_FAILURES_SHOWN:], Text(self._sum(len(at_work))))
+            left = f"{clock(seconds)} left" if seconds is not None else ""
+            left = "testing" if one.share == 1.0 else left
+            bar = ProgressBar(1.0, one.share, width=28)
+            table.add_row(Text(one.run.label), bar, f"{one.share:4.0%}", shown, left)
+        return Group(table, *failures[-_FAILURES_SHOWN:], Text(self._sum(len(working))))
 
-    def _sum(self, at_work: int) -> str:
+    def _sum(self, busy: int) -> str:
         """`5 min: 3 done, 1 failed, 2 at work, 6 waiting; 20 min left`."""
         now = time.monotonic()
         if now - self._estimated > _SECONDS_BETWEEN_ESTIMATES:
             self._estimated = now
             seconds = seconds_left(self._all, list(self._left.values()))
-            self._estimate = f"; {clock(seconds / max(1, at_work))} left" if seconds is not None else ""
-        ends = [f"{count} {outcome}" for outcome, count in self._ends.items()]
-        counts = [*ends, f"{at_work} at work", f"{len(self._left) - at_work} waiting"]
+            self._estimate = f"; {clock(seconds / max(1, busy))} left" if seconds is not None else ""
+        ends = [f"{count} {outcome}" for outcome, count in self.ends.items()]
+        counts = [*ends, f"{busy} at work", f"{len(self._left) - busy} waiting"]
         return f"{clock(now - self._began)}: {', '.join(counts)}{self._estimate}"
 
 

@@ -1,17 +1,34 @@
-"""`socialai experiment status`, `retry` and `cancel`: the runs of a folder, and wishes for them."""
+"""`socialai experiment plan`, `status`, `retry` and `cancel`: how far runs are, and wishes for them."""
 
 import argparse
 import sys
 
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_tables import status_text
+from socialai_dsl.cli.experiment_tables import plan_text, status_text
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.diagnostics import counted
 from socialai_dsl.experiments import work
-from socialai_dsl.experiments.figures import status_figures
+from socialai_dsl.experiments.estimate import Speeds
+from socialai_dsl.experiments.figures import plan_figures, status_figures
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
-from socialai_dsl.experiments.request import chosen_runs
+from socialai_dsl.experiments.measure import measure_unknown
+from socialai_dsl.experiments.request import chosen_runs, requested, usual_workers
+
+
+def plan(arguments: argparse.Namespace) -> Exit:
+    """Print the runs, the time they need and their progress."""
+    if arguments.json:
+        refuse(arguments, ("each",), "the JSON object has every run")
+    document, folder = requested(arguments.file, arguments.profile, arguments.out)
+    runs = runs_of(folder, document)
+    speeds = Speeds(runs)
+    if arguments.measure:
+        measure_unknown(runs, speeds, lambda line: print(line, file=sys.stderr, flush=True))
+    workers = arguments.workers or usual_workers(document)
+    figures = plan_figures(document, folder, runs, speeds, workers)
+    print(json_text(figures) if arguments.json else plan_text(figures, arguments.each))
+    return Exit.GOOD
 
 
 def status(arguments: argparse.Namespace) -> Exit:

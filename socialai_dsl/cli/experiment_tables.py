@@ -4,6 +4,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from socialai_dsl.cli.terminal import columns
+from socialai_dsl.experiments.figures import grouped, share_done
+
 _STATES: Final = ("done", "running", "waiting", "failed", "cancelled")
 _MESSAGES_SHOWN: Final = 10
 
@@ -20,10 +23,10 @@ def plan_text(figures: Mapping[str, Any], each: bool) -> str:
             _time(group),
             _states(row["state"] for row in group),
         )
-        for name, group in _groups(figures["runs"], each)
+        for name, group in grouped(figures["runs"], each)
     ]
     sources = dict.fromkeys(row["speed_from"] for row in figures["runs"] if row["speed_from"])
-    lines = [_title(figures), "", *_table(header, rows), ""]
+    lines = [_title(figures), "", *columns([header, *rows]), ""]
     unknown, seconds = figures["unknown"], figures["seconds"]
     known = [] if seconds is None else [clock(seconds)]
     time = " and ".join(known + ([f"an unknown time (of {unknown} runs, see --measure)"] if unknown else []))
@@ -40,14 +43,14 @@ def status_text(figures: Mapping[str, Any], each: bool) -> str:
         (
             name if not each else f"{name}  {group[0]['id']}",
             _numbers(row["seed"] for row in group),
-            f"{_share(group):.0%}",
+            f"{share_done(group):.0%}",
             _range_of_shares([r["success_rate"] for r in group if r["success_rate"] is not None]),
             _states(row["state"] for row in group),
         )
-        for name, group in _groups(figures["runs"], each)
+        for name, group in grouped(figures["runs"], each)
     ]
     states = _states(row["state"] for row in figures["runs"])
-    lines = [_title(figures), "", *_table(header, rows), "", states]
+    lines = [_title(figures), "", *columns([header, *rows]), "", states]
     said = [row for row in figures["runs"] if row["message"]]
     lines += [
         f"{row['conditions'][0]}, seed {row['seed']} ({row['id']}): {row['message']}"
@@ -72,31 +75,12 @@ def _title(figures: Mapping[str, Any]) -> str:
     return f"{figures['name']}{profile}, in {figures['folder']}"
 
 
-def _groups(rows: Sequence[dict[str, Any]], each: bool) -> list[tuple[str, list[dict[str, Any]]]]:
-    if each:
-        return [(" and ".join(row["conditions"]), [row]) for row in rows]
-    groups: dict[str, list[dict[str, Any]]] = {}
-    for row in rows:
-        for condition in row["conditions"]:
-            groups.setdefault(condition, []).append(row)
-    return list(groups.items())
-
-
 def _states(states: Iterable[str]) -> str:
     """`3 done, 1 running`; of a single run its state alone."""
     counted = Counter(states)
     if counted.total() == 1:
         return next(iter(counted))
     return ", ".join(f"{counted[state]} {state}" for state in _STATES if counted[state])
-
-
-def _share(group: Sequence[Mapping[str, Any]]) -> float:
-    """How much of the training is done; of agents that are not trained, how many have played."""
-    pairs = [(float(row["frames_done"]), float(row["frames"])) for row in group]
-    wanted = sum(frames for _, frames in pairs)
-    if not wanted:
-        return [row["state"] for row in group].count("done") / len(group)
-    return sum(min(done, frames) for done, frames in pairs) / wanted
 
 
 def _speed(group: Sequence[Mapping[str, Any]]) -> str:
@@ -130,11 +114,3 @@ def _range_of_shares(values: Sequence[float]) -> str:
         return "-"
     mean = sum(values) / len(values)
     return f"{mean:.1%}" if len(values) == 1 else f"{mean:.1%} ({min(values):.1%} to {max(values):.1%})"
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    return [
-        "  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip()
-        for row in (header, *rows)
-    ]

@@ -6,6 +6,7 @@ from typing import Final
 from socialai_dsl.authoring.templates import TEMPLATES, write_template
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.terminal import columns
 from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
@@ -31,8 +32,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Write the files, and the schema for editors beside them; nothing is written if one of them exists."""
     if arguments.list:
         refuse(arguments, ("name", "template"), "--list lists the templates and writes nothing")
-        width = max(map(len, TEMPLATES))
-        print("\n".join(f"{name:{width}}  {about}" for name, about in TEMPLATES.items()))
+        print("\n".join(columns(list(TEMPLATES.items()))))
         return Exit.GOOD
     if arguments.name is None:
         raise UsageError("expected a NAME, or --list")

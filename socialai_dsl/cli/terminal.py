@@ -1,8 +1,8 @@
-"""What commands print: its colours, lines that are written over, JSON."""
+"""What commands print: its colours, lines that are written over, JSON, tables."""
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import IO, Any
 
 
@@ -14,6 +14,13 @@ def shows_color(stream: IO[Any]) -> bool:
 def json_text(value: Any) -> str:
     """A value as the JSON that commands print."""
     return json.dumps(value, indent=2, ensure_ascii=False)
+
+
+def columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of a table, whose columns begin one below the other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = [[f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)] for row in rows]
+    return ["  ".join(row).rstrip() for row in padded]
 
 
 class ProgressLine:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -56,6 +58,26 @@ def drive(
             time.sleep(SECONDS_BETWEEN_LOOKS)
     finally:
         engine.stop()
+
+
+@contextlib.contextmanager
+def stopped_by_signals() -> Iterator[None]:
+    """Let SIGTERM stop the block as Ctrl-C does.
+
+    Raises:
+        KeyboardInterrupt: the block was stopped; the message says that the same command goes on.
+    """
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("stopped; the same command goes on from here") from None
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _known(run: PlannedRun) -> End | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,51 @@ def seconds_left(runs: Sequence[PlannedRun], left: Sequence[PlannedRun]) -> floa
     times = [_remaining(speeds, run) for run in left]
     known = [seconds for seconds in times if seconds is not None]
     return sum(known) if len(known) == len(times) else None
+
+
+@dataclass(frozen=True)
+class AtWork:
+    """A run that a process works on: the share of its frames that is done, and its last frames per second."""
+
+    run: PlannedRun
+    share: float
+    speed: float | None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds of training that are left; None if the speed is not known."""
+        return self.run.condition["frames"] * (1 - self.share) / self.speed if self.speed else None
+
+
+def at_work(runs: Iterable[PlannedRun]) -> list[AtWork]:
+    """Those of some runs that a process works on, here or elsewhere."""
+    found = []
+    for run in runs:
+        if run.shown_status.state == "running":
+            row = run.last_metrics or {}
+            share = min(1.0, row.get("frames", 0) / (run.condition["frames"] or 1))
+            found.append(AtWork(run, share, row.get("frames_per_second")))
+    return found
+
+
+def grouped(rows: Sequence[dict[str, Any]], each: bool) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The runs of each condition, by its name; with `each` every run alone, by the names of its conditions."""
+    if each:
+        return [(" and ".join(row["conditions"]), [row]) for row in rows]
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        for condition in row["conditions"]:
+            groups.setdefault(condition, []).append(row)
+    return list(groups.items())
+
+
+def share_done(group: Sequence[Mapping[str, Any]]) -> float:
+    """How much of the training is done; of agents that are not trained, how many have played."""
+    pairs = [(float(row["frames_done"]), float(row["frames"])) for row in group]
+    wanted = sum(frames for _, frames in pairs)
+    if not wanted:
+        return [row["state"] for row in group].count("done") / len(group)
+    return sum(min(done, frames) for done, frames in pairs) / wanted
 
 
 def _remaining(speeds: Speeds, run: PlannedRun) -> float | None:

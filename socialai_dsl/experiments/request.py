@@ -122,7 +122,7 @@ def threads(document: dict[str, Any]) -> int:
     return max(int(condition["options"].get("threads", 1)) for condition in document["conditions"])
 
 
-def workers(document: dict[str, Any]) -> int:
+def usual_workers(document: dict[str, Any]) -> int:
     """As many runs at once as this machine has cores for."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, cores // threads(document))

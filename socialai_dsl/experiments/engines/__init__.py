@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
+
+ENGINES: Final = ("local", "ray", "slurm")
+"""The names that `choice` knows."""
 
 
 class Handle(Protocol):
