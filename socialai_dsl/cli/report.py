@@ -1,13 +1,16 @@
 """`socialai report`: writes a page about an experiment or single runs, with figures and tables."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import refuse
-from socialai_dsl.cli.curves import draw_curves
 from socialai_dsl.cli.errors import Exit
+
+if TYPE_CHECKING:  # it loads pandas, which is only there if reports were asked for
+    from socialai_dsl.reporting.analysis import Summary
 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 
@@ -38,12 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the page, or the curves alone."""
-    from socialai_dsl.runs.report import report, require_libraries
+    from socialai_dsl.runs.report import curves, report
 
-    require_libraries()
     if arguments.curves is not None:
         refuse(arguments, ("out", "no_baselines"), "--curves draws the curves alone, into its own FILE")
-        return draw_curves(arguments.folders, arguments.curves)
+        for summary in curves(arguments.folders, arguments.curves):
+            print(_curves_text(summary))
+        print(f"written to {arguments.curves}")
+        return Exit.GOOD
     page = report(
         arguments.folders,
         arguments.out,
@@ -52,3 +57,17 @@ def execute(arguments: argparse.Namespace) -> Exit:
     )
     print(f"written to {page}")
     return Exit.GOOD
+
+
+def _curves_text(summary: "Summary") -> str:
+    """Success of each seed, and the mean rates of outcomes and rules, at a few moments, as Markdown."""
+    assert summary.seeds is not None, "internal: every run has a curve"
+    names, moments = summary.seeds.table()
+    rows = [["frames", *names]]
+    for frames, values in moments:
+        shown = ["" if math.isnan(value) else f"{value:.2f}" for value in values]
+        rows.append([f"{frames / 1e6:.2f} M", *shown])
+    head, *lines = (f"| {' | '.join(row)} |" for row in rows)
+    test = ", ".join(f"{rate:.3f}" for rate in summary.success)
+    rule = "|---" * len(rows[0]) + "|"
+    return "\n".join([f"\n{summary.name}\n", head, rule, *lines, "", f"test set: {test}"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,8 @@ from pydantic import ValidationError
 from socialai_dsl.reporting.records import UpdateRecord, described
 
 Float = NDArray[np.float64]
+_MOMENTS: Final = 8
+_WORTH_SHOWING: Final = 0.005
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,23 @@ class Seeds:
     frames: Float
     success: Float
     rates: Mapping[str, Float]
+
+    def table(self) -> tuple[list[str], list[tuple[float, list[float]]]]:
+        """A few moments of the curves.
+
+        Returns:
+            What is shown: success of each seed, then the mean of each rate that is worth showing. For each moment its
+            frames and these values; nan where no episode ended.
+        """
+        step = max(1, len(self.frames) // _MOMENTS)
+        names, curves = [f"run {number + 1}" for number in range(len(self.success))], [*self.success]
+        for name, rate in self.rates.items():
+            mean = mean_over_seeds(rate)
+            if np.nanmax(mean, initial=0.0) >= _WORTH_SHOWING:
+                names.append(name.partition("/")[2])
+                curves.append(mean)
+        moments = range(step - 1, len(self.frames), step)
+        return names, [(float(self.frames[at]), [float(curve[at]) for curve in curves]) for at in moments]
 
     def means(self, kind: str) -> dict[str, Float]:
         """Mean over the seeds of the rates of `outcomes` or of `rules`, by their own names, (B,) each."""

@@ -13,11 +13,11 @@ from socialai_dsl.episodes.players import require_trainer
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.levels import read_baselines, update_baselines
 from socialai_dsl.experiments.folder import EXPERIMENT
-from socialai_dsl.runs.folder import only_writer
+from socialai_dsl.runs.folder import METRICS, only_writer
 
 if TYPE_CHECKING:  # these load pandas and Matplotlib, which are only there if reports were asked for
     from socialai_dsl.baselines import Baselines
-    from socialai_dsl.reporting.analysis import Analysis
+    from socialai_dsl.reporting.analysis import Analysis, Summary
     from socialai_dsl.reporting.collect import Experiment
 
 PAGE: Final = "index.html"
@@ -58,6 +58,38 @@ def report(
         measured, notes = _baselines(experiment, there / BASELINES, baselines, tell)
         _write(analyse(experiment, measured, notes), there)
     return there / PAGE
+
+
+def curves(folders: Sequence[Path], out: Path) -> list[Summary]:
+    """Draw the learning curves of runs, as `socialai report --curves` does: seeds of one condition together.
+
+    Args:
+        folders: of runs.
+        out: the picture, whose name says its format.
+
+    Returns:
+        Of each condition what is known of it, with its `seeds`.
+
+    Raises:
+        UsageError: a folder is not that of a run that has learned, or a library is missing (a ValueError).
+        OSError: a file cannot be read or written.
+    """
+    require_libraries()
+    from socialai_dsl.reporting.analysis import Summary
+    from socialai_dsl.reporting.collect import read_runs
+    from socialai_dsl.reporting.plots import conditions_figure
+
+    try:
+        experiment = read_runs(folders)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    for run in experiment.runs:
+        if run.updates() is None:
+            said = "; ".join(run.problems) or f"it has no {METRICS} that can be read"
+            raise UsageError(f"{run.folder}: expected the folder of a run that has learned, {said}")
+    summaries = [Summary(condition) for condition in experiment.conditions]
+    conditions_figure(summaries).savefig(out)
+    return summaries
 
 
 def require_libraries() -> None:
