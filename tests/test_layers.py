@@ -86,7 +86,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "pydantic", "PIL"},
     ),
     "episodes": (
-        TEXT_SIDE | {"errors", "model_options", "program", "program_suite", "envs", "render", "traces"},
+        TEXT_SIDE
+        | {"errors", "model_options", "program", "program_suite", "envs", "render", "traces", "runs.folder"},
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (

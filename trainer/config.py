@@ -216,7 +216,7 @@ class RunConfig(_Options):
     @property
     def trains(self) -> bool:
         """Whether the agent is trained by this run."""
-        return self.agent == "ppo"
+        return self.agent == LEARNS
 
     @property
     def frames_per_update(self) -> int:
@@ -287,6 +287,9 @@ class RunConfig(_Options):
         files = {option: code_file(name, self.code_folder) for option, name in named.items() if ":" in name}
         return {option: file for option, file in files.items() if file.is_file()}
 
+
+LEARNS: Final = "ppo"
+"""The agent that its run trains."""
 
 UNTRAINED: Final = ("random", "oracle", "human")
 """Agents without a network: chance, the scenario's script, a person."""

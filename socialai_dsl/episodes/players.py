@@ -24,7 +24,8 @@ from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.model_options import ModelOptions
-from trainer.config import UNTRAINED
+from socialai_dsl.runs.folder import CONFIG, agent_of
+from trainer.config import LEARNS, UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
 
 MODEL_PREFIX: Final = "llm:"
@@ -49,6 +50,7 @@ class Player:
         tell, goal, language: what a language model or a person is told of the task, see `brief`; others read nothing.
         view: whether a person sees what the agent sees, or the whole `room`; all others have the seat's view.
         policy: a policy of one's own, which plays.
+        run: the folder that was named, if it said who plays.
 
     Raises:
         ValueError: the agent is neither a name nor a path.
@@ -63,6 +65,7 @@ class Player:
     out: Path | None = None
     options: ModelOptions | None = None
     policy: Policy | None = None
+    run: Path | None = None
     tell: Tell | None = None
     goal: str = ""
     language: str | None = None
@@ -224,14 +227,15 @@ def folder_of(agent: str) -> Path:
 def named_agent(agent: str, scenario: str) -> str:
     """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
 
-    A variant is played by the agent of what it is a variant of, unless it has one of its own.
+    A variant is played by the agent of what it is a variant of, unless it has one of its own. A folder may stand for
+    somebody else, see `played_again`.
 
     Raises:
         ScenarioError: the scenario has mistakes.
-        UsageError: none ships for it.
+        UsageError: none ships for it; or see `played_again`.
     """
     if agent != "shipped":
-        return agent
+        return played_again(agent)
     path, shipped = load(scenario).resolved.path, shipped_folder().resolve()
     _, *variants = scenario.partition("?")[0].split("+")
     known = shipped_agents()
@@ -242,6 +246,29 @@ def named_agent(agent: str, scenario: str) -> str:
             if name in known:
                 return PREFIX + name
     raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
+
+
+def played_again(agent: str) -> str:
+    """Who plays where an agent is named: the folder of a run or an evaluation stands for whoever played there.
+
+    Raises:
+        UsageError: a person or a language model played there, or an agent that is not here.
+        OSError: what the folder says cannot be read.
+    """
+    if agent in UNTRAINED or agent.startswith(MODEL_PREFIX):
+        return agent
+    folder = folder_of(agent)
+    if not (folder / CONFIG).is_file() or (played := agent_of(folder)) == LEARNS:
+        return agent
+    if Player(played).is_person or Player(played).is_model:
+        raise UsageError(
+            f"{folder}: {played!r} played there, which `socialai replay` shows; expected an agent that plays again"
+        )
+    if Player(played).is_trained and not folder_of(played).exists():
+        raise UsageError(
+            f"{folder}: {played!r} played there, which is not found from here; name the agent itself"
+        )
+    return played
 
 
 def session_folder(parent: Path, participant: str | None = None) -> Path:

@@ -17,7 +17,7 @@ from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
-from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.episodes.players import Player, make_policy, named_agent, played_again, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
@@ -69,7 +69,7 @@ def coverage(
 def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Which agents play, and under which name each finds the scenario."""
     for agent in agents or ("random", "oracle"):
-        if agent != "oracle":
+        if played_again(agent) != "oracle":
             yield agent, scenario
         elif agents:
             yield agent, with_script(scenario).name

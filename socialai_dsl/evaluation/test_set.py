@@ -1,8 +1,10 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -135,32 +137,64 @@ class Evaluation:
 
     def traces(self, numbers: Iterable[int]) -> list[Trace]:
         """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
+        chosen = list(numbers)
+        cut_short = {n: self.result.names[self.result.outcome[n]] for n in chosen if self.is_cut_short(n)}
+        texts = {one.name: one.text for one in self.endings}
+        played = _Played(
+            self.scenario, self.loaded, self.program, self.player, self.actions, texts, self.trials
+        )
+        return played.traces(chosen, self.replies, cut_short)
+
+
+@dataclass(frozen=True)
+class _Played:
+    """Test episodes that were played, as far as their traces need it; see `Evaluation`.
+
+    Attributes:
+        texts: ending -> what the scenario says of it.
+    """
+
+    scenario: str
+    loaded: Loaded
+    program: Playable
+    player: Player
+    actions: Mapping[int, list[NDArray[np.int64]]]
+    texts: Mapping[str, str]
+    trials: int
+
+    def traces(
+        self,
+        numbers: Sequence[int],
+        replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = MappingProxyType({}),
+        cut_short: Mapping[int, str] = MappingProxyType({}),
+    ) -> list[Trace]:
+        """See `Evaluation.traces`; `cut_short` has the endings of the episodes that no step ended."""
         env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded))
         try:
             # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
             thinks = self.player.is_trained and self.trials == 1
             policy = make_policy(self.player, env)[0] if thinks else None
-            return [self._trace(env, policy, number) for number in numbers]
+            return [
+                trace_of(
+                    env,
+                    self.actions[number],
+                    {"options": {"test_episode": number}},
+                    scenario=self.scenario,
+                    agent=self.player.agent,
+                    episode=f"test episode {number}",
+                    endings=self.texts,
+                    about=about_of(self.loaded),
+                    think=None if policy is None else _thinking(policy, number),
+                    replies=replies.get(number, ()),
+                    cut_short=self._outcome(cut_short.get(number)),
+                )
+                for number in numbers
+            ]
         finally:
             env.close()
 
-    def _trace(self, env: Any, policy: Any, number: int) -> Trace:
-        endings = {one.name: one.text for one in self.endings}
-        ending = self.result.names[self.result.outcome[number]]
-        cut_short = Outcome(name=ending, success=False, text=endings[ending])
-        return trace_of(
-            env,
-            self.actions[number],
-            {"options": {"test_episode": number}},
-            scenario=self.scenario,
-            agent=self.player.agent,
-            episode=f"test episode {number}",
-            endings=endings,
-            about=about_of(self.loaded),
-            think=None if policy is None else _thinking(policy, number),
-            replies=self.replies.get(number, ()),
-            cut_short=cut_short if self.is_cut_short(number) else None,
-        )
+    def _outcome(self, ending: str | None) -> Outcome | None:
+        return None if ending is None else Outcome(name=ending, success=False, text=self.texts[ending])
 
 
 def _thinking(policy: Any, number: int) -> Think:
@@ -209,23 +243,68 @@ def play_test_set(
             trials,
         )
         return replace(_of_model(played, scenario, loaded, program, player, briefing), trials=trials)
+    kept = Actions()
+    with _seated(player, scenario, loaded, program, episodes // trials) as (envs, policy, told):
+        result = evaluate_policy(policy, envs, episodes, [kept], trials)
+    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told, trials=trials)
+
+
+def trace_test_episodes(
+    player: Player, scenario: str, loaded: Loaded, program: Playable, numbers: Sequence[int], trials: int = 1
+) -> tuple[list[Trace], list[str]]:
+    """Trace some test episodes as `play_test_set` plays them, without playing those before.
+
+    What `random` or a network draws depends on its seed and on the number of the first episode of its session, and its
+    memory begins there. So the sessions with these episodes are played, from their first to their last episode.
+
+    Args:
+        player: who plays: the script, `random` or a network, of which this holds.
+        scenario: as it was asked for.
+        loaded: the same.
+        program: the same, compiled.
+        numbers: of the episodes.
+        trials: how many in a row the player remembers.
+
+    Returns:
+        The traces, and what is to be known about the player.
+
+    Raises:
+        UsageError: see `play_test_set`.
+    """
+    sessions = sorted({number - number % trials for number in numbers})
+    kept = Actions()
+    with _seated(player, scenario, loaded, program, len(sessions)) as (envs, policy, told):
+        play(
+            Rooms(envs, [kept]), {AGENT: policy}, TestEpisodes(sessions[-1] + trials, trials, iter(sessions))
+        )
+    texts = {one.name: one.text for one in endings_of(loaded, program)}
+    played = _Played(scenario, loaded, program, player, kept.played, texts, trials)
+    return played.traces(numbers), told
+
+
+@contextmanager
+def _seated(
+    player: Player, scenario: str, loaded: Loaded, program: Playable, sessions: int
+) -> Iterator[tuple[Any, Policy, list[str]]]:
+    """Rooms for so many sessions, as far as it is fast, who plays in them, and what is to be known about that.
+
+    Raises:
+        UsageError: the player does not fit the scenario, now or in the block.
+    """
     if player.is_trained:
         require_trainer()
     envs = make_vec(
         compiled(with_script(scenario, loaded).loaded) if player.is_script else program,
-        num_envs=min(_TOGETHER, episodes // trials),
+        num_envs=min(_TOGETHER, sessions),
         copy=False,
         autoreset_mode="Disabled",
     )
     try:
-        policy, told = make_policy(player, envs)
-        kept = Actions()
-        result = evaluate_policy(policy, envs, episodes, [kept], trials)
+        yield envs, *make_policy(player, envs)
     except ValueError as error:
         raise UsageError(f"{scenario}: {error}") from error
     finally:
         envs.close()
-    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told, trials=trials)
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.atomic import write_json
+from socialai_dsl.atomic import read_json, write_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import refuse_unknown
@@ -18,6 +18,7 @@ from socialai_dsl.episodes.players import (
     Player,
     folder_of,
     named_agent,
+    played_again,
     player_of,
     require_trainer,
     session_folder,
@@ -32,6 +33,7 @@ from socialai_dsl.runs.folder import (
     EVALUATIONS,
     LOCK_FILES,
     RESULT,
+    Run,
     new_folders,
     only_writer,
     scenario_folder_name,
@@ -71,8 +73,8 @@ def evaluate(
 
     Args:
         agent: `random`, `oracle` (the scenario's own script), `human`, `llm:MODEL`, `shipped`, `shipped:NAME`, or the
-            path of a run or of a checkpoint; a `Player`; or a policy of your own, see `Policy`, a model of
-            Stable-Baselines3, or a function from observations to actions.
+            path of a checkpoint or of a run, which stands for whoever played there; a `Player`; or a policy of your
+            own, see `Policy`, a model of Stable-Baselines3, or a function from observations to actions.
         scenario: a path or a name, with `+variants` and `?parameters`; None: that of the run.
         episodes: how many. Rooms are the same for every agent, on every machine.
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
@@ -116,7 +118,7 @@ def evaluate_each(
     folder = player.kept_in if player.is_model or player.is_person else out
     results = []
     with contextlib.nullcontext() if folder is None else _writing(folder):
-        for scenario in scenarios or [own_scenario(player.agent)]:
+        for scenario in scenarios or [own_scenario(str(player.run or player.agent))]:
             evaluation = _evaluated(player, scenario, episodes, trials, record, folder)
             results.append(result_of(evaluation))
             if folder is not None:
@@ -178,11 +180,14 @@ def made_player(
     if not isinstance(agent, str | Path):
         refuse_unknown("evaluate", options, (), "; what you hand over plays as it is")
         return player_of(agent, scenarios[0] if scenarios else "")
-    player = Player(str(agent), out=out)
+    player = Player(played_again(str(agent)), out=out)
     known, every = _OF_KINDS[player.kind], {name for names in _OF_KINDS.values() for name in names}
     refuse_unknown("evaluate", {k: v for k, v in options.items() if k not in every}, known)
     for name in sorted(options.keys() - set(known)):
         raise OptionError(name, f"the agent {player.agent!r} has no use for it")
+    if player.agent != str(agent):
+        player = replace(player, run=folder_of(str(agent)))
+        options = {**{k: v for k, v in _recorded(player).items() if k in known}, **options}
     if player.is_model:
         told = {name: value for name, value in options.items() if name in _TOLD}
         asked = {name: value for name, value in options.items() if name not in _TOLD}
@@ -198,6 +203,16 @@ def made_player(
     folder = own.within(folder_of(player.agent) if has_own else Path()).code_folder
     device = resolved_device(options.get("device", "auto"))
     return replace(player, folder=folder, **{**options, "device": device})
+
+
+def _recorded(player: Player) -> dict[str, Any]:
+    """The seed of what was drawn in the folder that said who plays, and whether actions were the most probable ones."""
+    assert player.run is not None, "internal: there is a folder"
+    run = Run(player.run)
+    return {
+        "seed": read_json(run.folder / CONFIG).get("seed", 0),
+        "greedy": (run.result or {}).get("greedy", False),
+    }
 
 
 def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:

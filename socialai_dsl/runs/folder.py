@@ -19,8 +19,8 @@ from socialai_dsl.atomic import read_json
 from socialai_dsl.errors import OptionError, UnreadableError, UsageError, described_error, first_mistake
 from socialai_dsl.runs.lock import HeldError, Holder, hold, holder
 from socialai_dsl.runs.status import Status
+from trainer.config import LEARNS, RunConfig, scenario_file, scenario_in
 from trainer.config import SCENARIO_FOLDER as SCENARIO
-from trainer.config import RunConfig, scenario_file, scenario_in
 from trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
 
 # What training writes, and the copy of the scenario, are named where the trainer finds them.
@@ -203,6 +203,18 @@ def read_config(folder: Path) -> RunConfig:
     except ValidationError as error:
         place, said = first_mistake(error.errors())
         raise UsageError(f"{folder / CONFIG}: {place}: {said}") from None
+
+
+def agent_of(folder: Path) -> str:
+    """Who plays in a run or an evaluation, as its folder says; `LEARNS` if the folder is that of a trained agent.
+
+    Raises:
+        UnreadableError, OSError: the folder does not say.
+    """
+    agent = read_json(folder / CONFIG).get("agent", LEARNS)
+    if not isinstance(agent, str):
+        raise UnreadableError(f"{folder / CONFIG}: agent: expected a text, got {agent!r}")
+    return agent
 
 
 def scenario_of(folder: Path) -> str:

@@ -6,11 +6,12 @@ import json
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from socialai_dsl.atomic import read_json, write_text
+from socialai_dsl.atomic import write_text
+from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.players import Agent, Player, folder_of, named_agent
 from socialai_dsl.episodes.scripts import script_of
@@ -20,10 +21,11 @@ from socialai_dsl.evaluation.test_set import (
     evaluation_of_model,
     evaluation_of_person,
     play_test_set,
+    trace_test_episodes,
 )
 from socialai_dsl.frontend import load
 from socialai_dsl.runs.evaluate import made_player, own_scenario
-from socialai_dsl.runs.folder import CONFIG
+from socialai_dsl.runs.folder import CONFIG, Run, agent_of
 from socialai_dsl.traces import Trace
 from socialai_dsl.traces.page import replay_page
 
@@ -53,7 +55,7 @@ def replay(
         agent: who plays a scenario, as for `evaluate` (default: its script if it has one, else `random`).
         episodes: how many test episodes are played (default: 100).
         record: up to how many successes, and how many failures, are kept (default: 5).
-        test_episodes: numbers of test episodes, which are kept instead.
+        test_episodes: numbers of test episodes, which are played and kept instead.
         greedy: whether a trained agent takes its most probable action.
 
     Raises:
@@ -74,8 +76,7 @@ def replay(
         if numbers is not None and (episodes is not None or record is not None):
             name = "record" if episodes is None else "episodes"
             raise OptionError(name, "--test-episode says which episodes are played and kept")
-        count = (episodes or PLAYED) if numbers is None else max(numbers) + 1
-        traces = _played(_evaluation(str(source), agent, count, greedy), record or REPLAYED, numbers)
+        traces = _played(str(source), agent, greedy, episodes or PLAYED, record or REPLAYED, numbers)
     if place is not None:
         written = place.suffix == ".json"
         whole = (
@@ -105,10 +106,37 @@ def _read(path: Path) -> list[Trace]:
     return traces
 
 
-def _played(evaluation: Evaluation, record: int, numbers: Sequence[int] | None) -> list[Trace]:
-    """Those episodes that were asked for, or successes and failures."""
-    for warning in evaluation.warnings:
-        warnings.warn(warning, stacklevel=3)
+def _played(
+    source: str, agent: Agent | None, greedy: bool, episodes: int, record: int, numbers: Sequence[int] | None
+) -> list[Trace]:
+    """Those episodes that were asked for, or successes and failures, of a run or a scenario."""
+    evaluation: Evaluation | None = None
+    trials = 1
+    if (folder_of(source) / CONFIG).is_file():
+        if agent is not None:
+            raise OptionError(
+                "agent", "a run is replayed by its own agent; name a scenario to let another play"
+            )
+        folder, scenario = folder_of(source), own_scenario(source)
+        evaluation = _kept(folder, scenario, episodes if numbers is None else max(numbers) + 1, greedy)
+        player = made_player(source, [], _greedy(greedy), None) if evaluation is None else evaluation.player
+        trials = (Run(folder).result or {}).get("trials", 1)
+    else:
+        scenario, player = source, _player_of_scenario(source, agent, greedy)
+    if evaluation is None:
+        loaded = load(scenario)
+        program = compiled(loaded)
+        # What a policy of one's own does may depend on all that it played before.
+        if numbers is not None and player.policy is None:
+            for number in numbers:
+                if not 0 <= number < MOST_EPISODES:
+                    raise OptionError("test_episode", f"got {number}, expected 0 to {MOST_EPISODES - 1}")
+            traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials)
+            _warn(told)
+            return traces
+        count = episodes if numbers is None else max(numbers) + 1
+        evaluation = play_test_set(player, scenario, loaded, program, -(-count // trials) * trials, trials)
+    _warn(evaluation.warnings)
     if numbers is None:
         return evaluation.traces(evaluation.to_replay(record))
     for number in numbers:
@@ -120,33 +148,37 @@ def _played(evaluation: Evaluation, record: int, numbers: Sequence[int] | None) 
     return evaluation.traces(numbers)
 
 
-def _evaluation(source: str, agent: Agent | None, episodes: int, greedy: bool) -> Evaluation:
-    """Test episodes of a run or a scenario."""
-    folder = folder_of(source)
-    if not (folder / CONFIG).is_file():
-        usual = "random" if script_of(source) is None else "oracle"
-        return _of_scenario(source, usual if agent is None else agent, episodes, greedy)
-    if agent is not None:
-        raise OptionError("agent", "a run is replayed by its own agent; name a scenario to let another play")
-    scenario, played_by = own_scenario(source), Player(str(read_json(folder / CONFIG).get("agent")))
-    if greedy and (played_by.is_person or played_by.is_model):
-        raise OptionError("greedy", f"the agent {played_by.agent!r} has played already")
-    if played_by.is_person:
-        return evaluation_of_person(folder, scenario, episodes)
-    if played_by.is_model:
-        return evaluation_of_model(folder, played_by.agent, scenario, episodes)
-    player = made_player(source, [], {"greedy": greedy}, None)
-    loaded = load(scenario)
-    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
+def _kept(folder: Path, scenario: str, most: int, greedy: bool) -> Evaluation | None:
+    """What a person or a language model has played in a folder; None of others, who play again."""
+    player = Player(agent_of(folder))
+    if not (player.is_person or player.is_model):
+        return None
+    if greedy:
+        raise OptionError("greedy", f"the agent {player.agent!r} has played already")
+    if player.is_person:
+        return evaluation_of_person(folder, scenario, most)
+    return evaluation_of_model(folder, player.agent, scenario, most)
 
 
-def _of_scenario(scenario: str, agent: Agent, episodes: int, greedy: bool) -> Evaluation:
+def _player_of_scenario(scenario: str, agent: Agent | None, greedy: bool) -> Player:
+    """Who plays a scenario, by default its script if it has one."""
+    if agent is None:
+        agent = "random" if script_of(scenario) is None else "oracle"
     named = named_agent(str(agent), scenario) if isinstance(agent, str | Path) else agent
-    player = made_player(named, [scenario], {"greedy": True} if greedy else {}, None)
+    player = made_player(named, [scenario], _greedy(greedy), None)
     if player.is_person or player.is_model:
         raise OptionError(
             "agent",
             f"got {player.agent!r}, who plays for `socialai evaluate`; what that writes is replayed by its folder",
         )
-    loaded = load(scenario)
-    return play_test_set(player, scenario, loaded, compiled(loaded), episodes)
+    return player
+
+
+def _greedy(greedy: bool) -> dict[str, Any]:
+    """What was typed; nothing else, because not every agent has a use for it."""
+    return {"greedy": True} if greedy else {}
+
+
+def _warn(told: Iterable[str]) -> None:
+    for warning in told:
+        warnings.warn(warning, stacklevel=4)

@@ -13,7 +13,10 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes import trace_of
+from socialai_dsl.episodes.players import Player
+from socialai_dsl.evaluation.test_set import play_test_set, trace_test_episodes
 from socialai_dsl.traces import Trace
 from socialai_dsl.traces.page import replay_page
 
@@ -74,6 +77,30 @@ def test_one_test_episode_and_traces_as_a_file() -> None:
     assert main(["replay", "talkitout", *(f"--test-episode={n}" for n in (7, 2, 7)), "-o", "two.json"]) == 0
     first, second = json.loads(Path("two.json").read_text(encoding="utf-8"))
     assert (first, second["episode"]) == (trace, "test episode 2")
+
+
+def test_a_late_test_episode_is_played_without_those_before() -> None:
+    (trace,) = sd.replay("dance", agent="random", test_episodes=[900_000])
+    assert trace.episode == "test episode 900000"
+
+
+@pytest.mark.parametrize("trials", [1, 3])
+@pytest.mark.parametrize("agent", ["random", "oracle", "shipped:dance"])
+def test_an_episode_that_is_played_without_others_is_that_of_the_evaluation(agent: str, trials: int) -> None:
+    loaded = sd.load("dance")
+    program, player = compiled(loaded), Player(agent, seed=4)
+    every = play_test_set(player, "dance", loaded, program, 12, trials)
+    alone, _ = trace_test_episodes(player, "dance", loaded, program, [11, 4, 5], trials)
+    assert alone == every.traces([11, 4, 5])
+
+
+@pytest.mark.parametrize("trials", [1, 3])
+def test_the_agent_of_a_folder_plays_again_with_its_seed_and_its_trials(trials: int) -> None:
+    evaluation = sd.evaluate("random", "dance", 6, seed=5, trials=trials, out="out")
+    assert evaluation.folder is not None
+    assert sd.replay(evaluation.folder, test_episodes=[4, 1]) == [
+        trace.model_copy(update={"scenario": evaluation.kept}) for trace in evaluation.traces([4, 1])
+    ]
 
 
 def test_what_trace_prints_can_be_replayed(capsys: Capture) -> None:

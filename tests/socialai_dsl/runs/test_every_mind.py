@@ -92,7 +92,22 @@ def test_every_kind_of_mind_lists_films_and_replays_its_episodes(folders: dict[s
         assert rooms.episode.tolist() == list(range(EPISODES)), kind
         assert list(folder.glob("*.gif")), kind
         assert (folder / "episode.html").stat().st_size < 400_000, kind
-        assert len(sd.replay(folder, test_episodes=[1])) == 1 if kind in ("model", "person") else True
+        if kind == "policy":
+            with pytest.raises(ValueError, match="'own' played there, which is not found from here"):
+                sd.replay(folder, test_episodes=[1])
+        else:
+            (trace,) = sd.replay(folder, test_episodes=[1])
+            assert len(trace.moments) == rooms.length[1] + 1, kind
+
+
+def test_who_played_in_a_folder_plays_again(folders: dict[str, Path]) -> None:
+    for kind in ("script", "chance", "network"):
+        before = json.loads((folders[kind] / "result.json").read_text())
+        again = sd.evaluate(folders[kind], episodes=EPISODES)
+        assert (again.player.kind, again.figures()) == (kind, before["eval"])
+    for kind in ("model", "person"):
+        with pytest.raises(ValueError, match="played there, which `socialai replay` shows"):
+            sd.evaluate(folders[kind], episodes=EPISODES)
 
 
 def test_one_report_joins_all_of_them_by_room(folders: dict[str, Path], tmp_path: Path) -> None:
