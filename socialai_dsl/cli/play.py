@@ -3,10 +3,8 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-import socialai_dsl
-from socialai_dsl.checking.briefing import brief
 from socialai_dsl.cli.arguments import (
     TELL_OPTIONS,
     add_participant,
@@ -17,8 +15,7 @@ from socialai_dsl.cli.arguments import (
 )
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.episodes.players import HUMAN_FOLDER, session_folder
-from socialai_dsl.runs.folder import scenario_folder_name
+from socialai_dsl.episodes.players import HUMAN_FOLDER
 
 SUMMARY: Final = "play a scenario in the terminal"
 
@@ -52,18 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play episode after episode until the player quits."""
-    from socialai_dsl.play import play
+    from socialai_dsl.evaluation.people import play_seed
 
-    briefing = brief(socialai_dsl.load(arguments.scenario), **typed_options(arguments, TELL_OPTIONS))
-    name = scenario_folder_name(arguments.scenario)
-    session = session_folder(arguments.out, arguments.participant)
-
-    def episode(number: int) -> tuple[str, dict[str, Any]]:
-        own = arguments.seed + number
-        return f"{name}, seed {own}", {"seed": own}
-
-    about = {"session": session.name, "scenario": name}
-    for played in play(arguments.scenario, episode, session / name, about, briefing, arguments.view):
-        print(printable(str(played)))
-    print(f"every step is in {session / name}", file=sys.stderr)
+    told = typed_options(arguments, TELL_OPTIONS)
+    played, folder = play_seed(
+        arguments.scenario, arguments.seed, arguments.out, arguments.participant, arguments.view, **told
+    )
+    for episode in played:
+        print(printable(str(episode)))
+    print(f"every step is in {folder}", file=sys.stderr)
     return Exit.GOOD

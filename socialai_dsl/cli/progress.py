@@ -1,7 +1,6 @@
 """The progress of a run: a live bar on a terminal, plain lines elsewhere."""
 
 import time
-from collections import deque
 from types import TracebackType
 from typing import IO, Self
 
@@ -13,7 +12,6 @@ from socialai_dsl.runs import train
 
 _SECONDS_BETWEEN_LINES = 5.0
 _SECONDS_BETWEEN_SENTENCES = 15.0
-_REMEMBERED_UPDATES = 20
 
 
 class RunProgress:
@@ -27,8 +25,7 @@ class RunProgress:
         self._stream = stream
         self._scenario = scenario
         self._last_line = self._last_sentence = time.monotonic()
-        self._ended: deque[tuple[float, int]] = deque(maxlen=_REMEMBERED_UPDATES)
-        self._speed: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
+        self._pace = train.Pace()
         self._bar: Progress | None = None
 
     def __enter__(self) -> Self:
@@ -42,12 +39,10 @@ class RunProgress:
 
     def update(self, progress: train.Progress) -> None:
         """Report how far the run is."""
-        if not self._speed and not progress.frames_per_second:
+        if not self._pace.speed and not progress.frames_per_second:
             self._begin(progress)
             return
-        if progress.success is not None:
-            self._ended.append((progress.success, progress.episodes))
-        self._speed.append(progress.frames_per_second)
+        self._pace.note(progress)
         frames, total, text = progress.frames, progress.total, self._text(progress)
         if self._bar is not None:
             self._bar.update(self._task, completed=min(frames, total), text=text)
@@ -83,13 +78,9 @@ class RunProgress:
             print(f"    {sentence}", file=self._stream, flush=True)
 
     def _text(self, progress: train.Progress) -> str:
-        # The mean time of a frame, not the mean speed: a slow update counts for as long as it took.
-        speed = len(self._speed) / sum(1 / max(s, 1e-9) for s in self._speed)
-        left = max(progress.total - progress.frames, 0) / speed
-        episodes = sum(episodes for _, episodes in self._ended)
-        succeeded = sum(success * episodes for success, episodes in self._ended)
-        success = f"  success {succeeded / episodes:.3f}" if episodes else ""
-        return f"{speed:>9,.0f} frames/s{success}  {_clock(left)} left"
+        pace, left = self._pace, _clock(self._pace.seconds_left(progress))
+        success = "" if pace.success is None else f"  success {pace.success:.3f}"
+        return f"{pace.speed:>9,.0f} frames/s{success}  {left} left"
 
 
 def _size(program: Playable) -> str:

@@ -24,10 +24,10 @@ from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
+from socialai_dsl.evaluation.people import play_test_episodes
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
-from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
@@ -227,7 +227,7 @@ def play_test_set(
     """
     endings, briefing = endings_of(loaded, program), player.briefing(loaded)
     if player.is_person:
-        person = _let_a_person_play(player, scenario, program, episodes, briefing)
+        person = play_test_episodes(player, scenario, program, episodes, briefing)
         return _of_person(person, scenario, loaded, program, player, briefing)
     if player.is_model:
         assert player.options is not None, "internal: a language model has options"
@@ -369,22 +369,6 @@ def evaluate_policy(
     play(Rooms(envs, [results, *observers]), {AGENT: policy}, TestEpisodes(episodes, trials))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
-
-
-def _let_a_person_play(
-    player: Player, scenario: str, program: Playable, episodes: int, briefing: Briefing
-) -> "list[FinishedEpisode]":
-    """Let a person play test episodes until they quit, and keep everything in the session's folder."""
-    from socialai_dsl.play import play
-
-    session, name = player.kept_in, scenario_folder_name(scenario)
-    about = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
-
-    def episode(number: int) -> tuple[str, dict[str, Any]] | None:
-        title = f"test episode {number}" if player.view == "seat" else f"{name}, test episode {number}"
-        return (title, {"options": {"test_episode": number}}) if number < episodes else None
-
-    return play(scenario, episode, session / name, about, briefing, player.view, practice=False)
 
 
 def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:

@@ -6,9 +6,11 @@ import contextlib
 import shutil
 import traceback
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import harmonic_mean
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.atomic import write_json
@@ -45,6 +47,7 @@ from trainer.files import checkpoint_files
 if TYPE_CHECKING:
     from socialai_dsl.runs.tracking import WandbTracker
 
+_REMEMBERED_UPDATES: Final = 20
 _AGENTS: Final = ("ppo", *UNTRAINED)
 
 
@@ -70,6 +73,36 @@ class Progress:
     episodes: int = 0
     frames_per_second: float = 0.0
     learnt: str = ""
+
+
+class Pace:
+    """How fast and how well the last updates of a run went, and the time that is left."""
+
+    def __init__(self) -> None:
+        self._ended: deque[tuple[float, int]] = deque(maxlen=_REMEMBERED_UPDATES)
+        self._speed: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
+
+    def note(self, progress: Progress) -> None:
+        """Take note of an update."""
+        if progress.success is not None:
+            self._ended.append((progress.success, progress.episodes))
+        self._speed.append(max(progress.frames_per_second, 1e-9))
+
+    @property
+    def speed(self) -> float:
+        """Frames per second; 0 before the first update."""
+        # By the mean time of a frame, not the mean speed: a slow update counts for as long as it took.
+        return harmonic_mean(self._speed) if self._speed else 0.0
+
+    @property
+    def success(self) -> float | None:
+        """The share of episodes that succeeded; None where none has ended."""
+        episodes = sum(episodes for _, episodes in self._ended)
+        return sum(share * ended for share, ended in self._ended) / episodes if episodes else None
+
+    def seconds_left(self, progress: Progress) -> float:
+        """Seconds of training that are left."""
+        return max(progress.total - progress.frames, 0) / self.speed
 
 
 Report = Callable[[Progress], None]

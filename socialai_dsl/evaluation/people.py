@@ -1,0 +1,68 @@
+"""People play at the terminal: the rooms of a seed for as long as they like, or the test set."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from socialai_dsl.checking.briefing import Briefing, brief
+from socialai_dsl.episodes.players import HUMAN_FOLDER, Player, session_folder
+from socialai_dsl.frontend import load
+from socialai_dsl.program_suite import Playable
+from socialai_dsl.runs.folder import scenario_folder_name
+
+if TYPE_CHECKING:  # it needs Textual
+    from socialai_dsl.play.game import FinishedEpisode, Sight
+
+
+def play_seed(
+    scenario: str,
+    seed: int = 0,
+    out: Path = HUMAN_FOLDER,
+    participant: str | None = None,
+    view: "Sight" = "room",
+    **told: Any,
+) -> "tuple[list[FinishedEpisode], Path]":
+    """Let a person play until they quit, as `socialai play` does.
+
+    Args:
+        scenario: a path or a name, with `+variants` and `?parameters`.
+        seed: of the first episode; later episodes have the next seeds.
+        out: gets a folder of the session.
+        participant: begins the name of that folder.
+        view: whether the person sees what the agent sees, or the whole room.
+        told: what they are told of the task, see `brief`.
+
+    Returns:
+        The episodes that were played to their end, and the folder with every step.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: there is no terminal.
+        OSError: the folder cannot be written.
+    """
+    from socialai_dsl.play import play
+
+    briefing, name = brief(load(scenario), **told), scenario_folder_name(scenario)
+    session = session_folder(out, participant)
+
+    def episode(number: int) -> tuple[str, dict[str, Any]]:
+        own = seed + number
+        return f"{name}, seed {own}", {"seed": own}
+
+    about = {"session": session.name, "scenario": name}
+    return play(scenario, episode, session / name, about, briefing, view), session / name
+
+
+def play_test_episodes(
+    player: Player, scenario: str, program: Playable, episodes: int, briefing: Briefing
+) -> "list[FinishedEpisode]":
+    """Let a person play test episodes until they quit, and keep everything in the session's folder."""
+    from socialai_dsl.play import play
+
+    session, name = player.kept_in, scenario_folder_name(scenario)
+    about = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
+
+    def episode(number: int) -> tuple[str, dict[str, Any]] | None:
+        title = f"test episode {number}" if player.view == "seat" else f"{name}, test episode {number}"
+        return (title, {"options": {"test_episode": number}}) if number < episodes else None
+
+    return play(scenario, episode, session / name, about, briefing, player.view, practice=False)
