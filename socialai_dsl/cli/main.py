@@ -52,12 +52,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     _add_version(parser, words)
     parser.add_argument(
         "--print-completion",
+        action=_Completion,
         choices=("bash", "zsh", "fish"),
         metavar="SHELL",
         help="print a completion script for bash, zsh or fish, and exit",
     )
-    # What is done without a command, which has its own `execute`.
-    parser.set_defaults(execute=lambda typed: _print_completion(parser, typed.print_completion), debug=False)
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", prog="socialai", help=argparse.SUPPRESS
     )
@@ -197,17 +196,25 @@ class _Parser(argparse.ArgumentParser):
         super().error(printable(message))
 
 
-def _print_completion(parser: argparse.ArgumentParser, shell: str) -> Exit:
-    """Print a script that lets a shell complete commands, options and their values."""
-    import shtab
+class _Completion(argparse.Action):
+    """Prints a script that lets a shell complete commands, options and their values, and ends the command."""
 
-    for action in _actions(parser):
-        if isinstance(action, argparse._SubParsersAction):
-            action.help = None  # `--help` lists the commands in groups instead
-        if action.type is Path or (action.metavar in _FILES_OR_NAMES and action.choices is None):
-            action.complete = shtab.FILE  # type: ignore[attr-defined]
-    print(shtab.complete(parser, shell=shell))
-    return Exit.GOOD
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        import shtab
+
+        for action in _actions(parser):
+            if isinstance(action, argparse._SubParsersAction):
+                action.help = None  # `--help` lists the commands in groups instead
+            if action.type is Path or (action.metavar in _FILES_OR_NAMES and action.choices is None):
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(parser, shell=str(values)))
+        parser.exit(Exit.GOOD)
 
 
 _FILES_OR_NAMES: Final = ("SCENARIO", "PATH", "FILE", "RUN", "CODE|SCENARIO", "RUN|SCENARIO|TRACES")
