@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Final
 
 from socialai_dsl.analysis.effort import Clock, Effort
-from socialai_dsl.analysis.validation import validate
 from socialai_dsl.checking.formats import FORMATS, CheckedInput, every_finding, limited
 from socialai_dsl.cli.arguments import add_effort, limit, positive, refuse
 from socialai_dsl.cli.errors import Exit
@@ -76,6 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
+    from socialai_dsl.analysis.validation import validate
+
     if not arguments.deep:
         refuse(arguments, ("rooms", "seconds"), "it is for --deep; nothing is played without")
     if STDIN not in arguments.paths:
