@@ -72,4 +72,4 @@ class ModelOptions:
 
 def meanings() -> dict[str, str]:
     """Option -> what `ModelOptions` says of it; nothing where Python keeps no docstrings."""
-    return dict(re.findall(r"^ {8}(\w+): (.*)\.$", ModelOptions.__doc__ or "", re.MULTILINE))
+    return dict(re.findall(r"^ {8}([a-z_]+): (.*)\.$", ModelOptions.__doc__ or "", re.MULTILINE))

@@ -35,4 +35,4 @@ def add_option(parser: argparse._ActionsContainer, name: str) -> None:
     field = _FIELDS[name]
     metavar, kind = _VALUES.get(name, (None, None))
     value = {} if kind is None else {"metavar": metavar, "type": kind}
-    add_declared(parser, name, field.type, meanings()[name], field.default, **value)
+    add_declared(parser, name, field.type, meanings().get(name, ""), field.default, **value)

@@ -124,18 +124,12 @@ def _played(
     else:
         scenario, player = source, _player_of_scenario(source, agent, greedy)
     if evaluation is None:
-        loaded = load(scenario)
-        program = compiled(loaded)
         # What a policy of one's own does may depend on all that it played before.
         if numbers is not None and player.policy is None:
-            for number in numbers:
-                if not 0 <= number < MOST_EPISODES:
-                    raise OptionError("test_episode", f"got {number}, expected 0 to {MOST_EPISODES - 1}")
-            traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials)
-            _warn(told)
-            return traces
-        count = episodes if numbers is None else max(numbers) + 1
-        evaluation = play_test_set(player, scenario, loaded, program, -(-count // trials) * trials, trials)
+            return _alone(player, scenario, numbers, trials)
+        loaded, count = load(scenario), episodes if numbers is None else max(numbers) + 1
+        whole = -(-count // trials) * trials
+        evaluation = play_test_set(player, scenario, loaded, compiled(loaded), whole, trials)
     _warn(evaluation.warnings)
     if numbers is None:
         return evaluation.traces(evaluation.to_replay(record))
@@ -146,6 +140,17 @@ def _played(
                 f"got {number}, expected less than {len(evaluation.actions)}, as many as were played",
             )
     return evaluation.traces(numbers)
+
+
+def _alone(player: Player, scenario: str, numbers: Sequence[int], trials: int) -> list[Trace]:
+    """These test episodes, without playing others than those of their sessions."""
+    for number in numbers:
+        if not 0 <= number < MOST_EPISODES:
+            raise OptionError("test_episode", f"got {number}, expected 0 to {MOST_EPISODES - 1}")
+    loaded = load(scenario)
+    traces, told = trace_test_episodes(player, scenario, loaded, compiled(loaded), numbers, trials)
+    _warn(told, callers=5)
+    return traces
 
 
 def _kept(folder: Path, scenario: str, most: int, greedy: bool) -> Evaluation | None:
@@ -179,6 +184,7 @@ def _greedy(greedy: bool) -> dict[str, Any]:
     return {"greedy": True} if greedy else {}
 
 
-def _warn(told: Iterable[str]) -> None:
+def _warn(told: Iterable[str], callers: int = 4) -> None:
+    """Warn whoever called `replay`, so many calls above."""
     for warning in told:
-        warnings.warn(warning, stacklevel=4)
+        warnings.warn(warning, stacklevel=callers)

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.cli.main import _COMMANDS, main
+from socialai_dsl.cli.model_options import MODEL_OPTIONS
+from socialai_dsl.model_options import meanings
 from trainer.config import HYPER
 
 Capture = pytest.CaptureFixture[str]
@@ -65,6 +67,10 @@ def refused(words: list[str], option: str, capsys: Capture) -> str:
     assert len(told.splitlines()[-1]) < 400
     assert set(Path().rglob("*")) == before
     return told
+
+
+def test_every_option_of_language_models_has_a_meaning() -> None:
+    assert tuple(meanings()) == MODEL_OPTIONS
 
 
 def test_the_numbers_of_every_command_are_looked_at() -> None:
