@@ -11,6 +11,7 @@ import pytest
 from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
 from trainer import checkpoint as checkpoints
+from trainer.config import OWN, RunConfig
 from trainer.files import CHECKPOINTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
@@ -18,7 +19,7 @@ TEXT = PAGE.read_text(encoding="utf-8")
 FILES = dict(re.findall(r"^```\w+\n# (\S+)\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL))
 CODE = sorted(name for name in FILES if name.endswith(".py"))
 COMMANDS = re.findall(r"^\$ socialai-run (.*)$", TEXT, re.MULTILINE)
-LONGEST = 40
+LONGEST = 60
 BUDGET = [
     "--frames",
     "2000",
@@ -53,9 +54,10 @@ def weights(run_folder: Path) -> dict[str, Any]:
 
 
 def test_the_page_has_an_example_of_each() -> None:
-    for option in ("bonus", "net", "curriculum", "guide"):
+    for option in RunConfig(**dict.fromkeys(OWN, "mine:Own")).own_classes:
         assert any(f"--{option} " in command for command in COMMANDS), option
-    assert len(CODE) == len(COMMANDS) == 4
+    named = [word.partition(":")[0] for command in COMMANDS for word in command.split() if ":" in word]
+    assert sorted(f"{name}.py" for name in named) == CODE, "each is used once"
 
 
 @pytest.mark.parametrize("name", CODE)
@@ -80,6 +82,8 @@ def test_an_example_trains_and_resumes_exactly(
     rows = [json.loads(line) for line in Path("whole/metrics.jsonl").read_text("utf-8").splitlines()]
     if "--bonus" in options:
         assert rows[0]["bonus"] > rows[1]["bonus"] > 0, "what is seen again pays less"
+    if "--aux" in options:
+        assert rows[0]["aux_loss"] > rows[1]["aux_loss"] > 0, "it is learnt"
     if "--guide" in options:
         assert rows[0]["led"] == 1
         assert rows[1]["led"] < 1, "the share of the script fades"

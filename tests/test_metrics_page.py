@@ -15,6 +15,14 @@ from trainer.ppo import train
 PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
 
 
+LOSS = """
+from trainer.auxiliary import AuxiliaryLoss
+class Loss(AuxiliaryLoss):
+    def forward(self, frames, outputs, net):
+        return outputs.memory.square().mean()
+"""
+
+
 def tables() -> list[list[str]]:
     """The first column of each table of fields, in order."""
     found: list[list[str]] = []
@@ -28,9 +36,11 @@ def tables() -> list[list[str]]:
 
 def test_every_field_of_a_row_is_named_in_its_order(tmp_path: Path) -> None:
     envs = socialai_dsl.make_vec("help+oracle", num_envs=16, copy=False, autoreset_mode="SameStep")
-    for guide, left_out in (("script", set()), ("none", {"imitation_loss", "led", "agreement"})):
+    (tmp_path / "mine.py").write_text(LOSS, encoding="utf-8")
+    for guide, left_out in (("script", set()), ("none", {"imitation_loss", "aux_loss", "led", "agreement"})):
         run = tmp_path / guide
-        train(RunConfig(frames=512, envs=16, guide=guide, tensorboard=False), envs, run)
+        own = {"aux": "mine:Loss", "scenario": str(tmp_path / "x.yaml")} if guide == "script" else {}
+        train(RunConfig(frames=512, envs=16, guide=guide, tensorboard=False, **own), envs, run)
         row = json.loads((run / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1])
         assert list(row) == [field for field in tables()[0] if field not in left_out]
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.minibatch import Batch
+from trainer.frames import Batch, Frames, Outputs
 from trainer.nets import ActorCritic
 from trainer.nets.dialogue import PrefixTree, prefix_tree
 from trainer.nets.memory import emptied
@@ -47,8 +47,8 @@ class Chunks:
     starts: Tensor
     weight: float = 1.0
 
-    def evaluate(self, net: ActorCritic) -> Iterator[tuple[Batch, Tensor, Tensor]]:
-        """Frames, logits (C, sum of sizes) and values (C,) under the present weights, a part for each step.
+    def evaluate(self, net: ActorCritic) -> Iterator[Frames]:
+        """The frames under the present weights, a part of C for each step.
 
         Replaces the memories it passes through.
         """
@@ -63,7 +63,8 @@ class Chunks:
             output, memory = net.memory.step(features, emptied(memory, self.resets[now]))
             if t + 1 < self.length:
                 self.memories[first + t + 1, env] = memory.detach()
-            yield self.batch.pick(itemgetter(now)), *net.heads(output)
+            logits, values = net.heads(output)
+            yield Frames(self.batch.pick(itemgetter(now)), Outputs(logits, values, features, output))
 
 
 def chunks(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Chunks]]:

@@ -87,10 +87,12 @@ class _Starts(BaseModel):
         "the guide that shows the task: none, script (the scenario's own script plays, the agent imitates it) or "
         "mine:Guide",
     )
+    aux: Name = _flag("none", "an auxiliary loss besides the agent's own: none or mine:Loss")
     guide_share: float = _option(0.5, "first share of the frames, led by the guide (measured)", ge=0, le=1)
     imitation_coef: float = _coefficient(
         1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0
     )
+    aux_coef: float = _coefficient(1.0, "weight of the auxiliary loss", ge=0)
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1, le=65_536)
     bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
@@ -153,6 +155,9 @@ class _Starts(BaseModel):
     )
 
 
+OWN: Final = ("net", "bonus", "curriculum", "guide", "aux")
+"""Options that may name a class of the user's own, such as `mine:Net`."""
+
 SCHEDULED: Final = tuple(
     name
     for name, field in _Starts.model_fields.items()
@@ -209,8 +214,11 @@ class RunConfig(_Options):
                 f"bptt: got {self.bptt}, expected less than horizon = {self.horizon} and not 0, because the update "
                 "shifts chunks of that many steps"
             )
-        if self.update == "chunks" and self.guide != "none":
-            raise ValueError("guide: the update `chunks` is the paper's and learns from the reward alone")
+        for option in ("guide", "aux"):
+            if self.update == "chunks" and getattr(self, option) != "none":
+                raise ValueError(
+                    f"{option}: the update `chunks` is the paper's and learns from the reward alone"
+                )
         return self
 
     @property
@@ -283,9 +291,14 @@ class RunConfig(_Options):
     @property
     def own_files(self) -> dict[str, Path]:
         """The files of the user's own classes beside the scenario, by the option that names them."""
-        named = {option: getattr(self, option) for option in ("net", "bonus", "curriculum", "guide")}
-        files = {option: code_file(name, self.code_folder) for option, name in named.items() if ":" in name}
+        files = {option: code_file(name, self.code_folder) for option, name in self.own_classes.items()}
         return {option: file for option, file in files.items() if file.is_file()}
+
+    @property
+    def own_classes(self) -> dict[str, str]:
+        """The user's own classes, such as `mine:Net`, by the option that names them."""
+        named = {option: getattr(self, option) for option in OWN}
+        return {option: name for option, name in named.items() if ":" in name}
 
 
 LEARNS: Final = "ppo"

@@ -15,12 +15,14 @@ import torch
 from torch import Tensor, nn
 
 from trainer import actions as heads
+from trainer.auxiliary import loss_of
 from trainer.chunks import Chunks, chunks
 from trainer.config import RunConfig
 from trainer.errors import require_finite
 from trainer.files import CHECKPOINTS, checkpoint_files
+from trainer.frames import Batch, Environments
 from trainer.logging import Metrics, MetricsLog, Tracker
-from trainer.minibatch import Batch, Environments, environments
+from trainer.minibatch import cut_out, environments
 from trainer.rollout import Rollout, collect
 from trainer.session import Mapper, Session, explained_stops, threads_of
 
@@ -94,7 +96,7 @@ class Figures(NamedTuple):
 
 
 class LossParts(NamedTuple):
-    """The loss, and figures about it; all are scalars but the last, and only the first has gradients.
+    """The loss, and figures about it; all are scalars but `counts`, and only the loss has gradients.
 
     Each figure is a mean over the frames that it is about: policy, entropy, divergence and clipping those in which the
     agent acted by itself, imitation those that a guide shows, by weight. Of no frames it is not a number.
@@ -106,6 +108,7 @@ class LossParts(NamedTuple):
         clip_fraction: share of ratios outside the clipping range.
         imitation_loss: cross-entropy between the policy and a guide's actions, nats.
         counts: (7,), the number of entries that each of these is a mean over.
+        aux_loss: the auxiliary loss of all frames, before its coefficient; None without one.
     """
 
     loss: Tensor
@@ -116,15 +119,21 @@ class LossParts(NamedTuple):
     clip_fraction: Tensor
     imitation_loss: Tensor
     counts: Tensor
+    aux_loss: Tensor | None = None
 
     def figures(self) -> Figures:
-        """All of them without gradients, in the order of `STATISTICS`."""
-        *means, counts = self
-        return Figures(torch.stack(means).detach(), counts)
+        """All of them without gradients, in the order of `STATISTICS`, and an auxiliary loss behind them."""
+        *means, counts, aux_loss = self
+        figures = Figures(torch.stack(means).detach(), counts)
+        if aux_loss is None:
+            return figures
+        return Figures(
+            *(torch.cat(pair) for pair in zip(figures, (aux_loss.detach()[None], counts[:1]), strict=True))
+        )
 
 
-STATISTICS = LossParts._fields[:-1]
-"""The figures that are known of a gradient step."""
+STATISTICS = LossParts._fields[:-2]
+"""The figures that are known of each gradient step."""
 
 SHORTER, LONGER = 0.5, 1.25
 """What the learning rate is multiplied by after an update that left the trust region, and after one that did not."""
@@ -192,7 +201,7 @@ def ppo_loss(
         every, of_own = torch.ones_like(own).mean(), own.mean()
         shares = torch.stack((every, of_own, every, of_own, of_own, took_part.mean(), shown.mean()))
         _, *figures = torch.stack(means) / shares
-        return LossParts._make((total, *figures, shares * len(values)))
+        return LossParts._make((total, *figures, shares * len(values), None))
 
 
 # -- update -------------------------------------------------------------------------------------------------------
@@ -212,7 +221,8 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     minibatch without any ends nothing.
 
     Returns:
-        `STATISTICS` by name, means over the minibatches, None where they have no frame of that kind; the mean norm of
+        `STATISTICS` by name, means over the minibatches, None where they have no frame of that kind, and with an
+        auxiliary loss `aux_loss`; the mean norm of
         the gradient before clipping; the share of the value's variance that the critic explained, in all frames; and
         the learning rate.
 
@@ -221,12 +231,20 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     """
     net, config = session.actor.net, session.now
     sizes, used = net.spec.action_sizes, net.spec.used
-    parameters = list(net.parameters())
+    parameters = [parameter for module in session.modules.values() for parameter in module.parameters()]
     session.optimizer.param_groups[0]["lr"] = config.lr * session.step_scale
-    batch = estimate_advantages(config, rollout)
+    batch, aux = estimate_advantages(config, rollout), session.aux
+    if aux is not None:
+        aux.begin(cut_out(session, rollout, batch, torch.arange(config.envs)), net, session.generator)
 
     def differentiate(share: Environments | Chunks) -> tuple[Figures, Sequence[Tensor | None]]:
-        parts = [ppo_loss(*part, sizes, config, used) for part in share.evaluate(net)]
+        parts = []
+        for frames, outputs in share.evaluate(net):
+            part = ppo_loss(frames, outputs.logits, outputs.values, sizes, config, used)
+            if aux is not None and isinstance(share, Environments):
+                extra = loss_of(aux, share, outputs, net)
+                part = part._replace(loss=part.loss + config.aux_coef * extra, aux_loss=extra)
+            parts.append(part)
         loss = torch.stack([part.loss for part in parts]).mean() * share.weight
         found = Figures.pooled([part.figures() for part in parts])
         return found, torch.autograd.grad(loss, parameters, allow_unused=True)
@@ -257,10 +275,12 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
         session.optimizer.step()
     else:
         session.step_scale = min(1.0, session.step_scale * LONGER)
-    for name, value in net.state_dict().items():  # also of its buffers
-        require_finite(f"an entry of the network's {name}", value)
+    for part, module in session.modules.items():
+        for name, value in module.state_dict().items():  # also of its buffers
+            require_finite(f"an entry of {_WHOSE[part]} {name}", value)
     unexplained = (batch.returns - batch.values).var(correction=0) / (batch.returns.var(correction=0) + 1e-8)
-    known = zip(STATISTICS, *(column.tolist() for column in Figures.pooled(steps)), strict=True)
+    names = STATISTICS if aux is None else (*STATISTICS, "aux_loss")
+    known = zip(names, *(column.tolist() for column in Figures.pooled(steps)), strict=True)
     figures = {name: mean if share else None for name, mean, share in known}
     figures["grad_norm"] = float(torch.stack(norms).mean())
     figures["explained_variance"] = 1 - float(unexplained)
@@ -269,6 +289,9 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
         if figure is not None:
             require_finite(f"{name} of the update", figure)
     return figures
+
+
+_WHOSE = {"net": "the network's", "aux": "the auxiliary loss's"}
 
 
 def _sum(parameter: Tensor, gradients: Sequence[Tensor | None]) -> Tensor | None:

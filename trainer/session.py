@@ -14,9 +14,10 @@ import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from trainer import checkpoint as checkpoints
+from trainer.auxiliary import AuxiliaryLoss, build_auxiliary
 from trainer.bonus import Bonus, build_bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
 from trainer.config import RunConfig
@@ -31,6 +32,7 @@ Mapper = Callable[..., Iterable[Any]]
 """`map`, or that of a pool of threads."""
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
+_MOMENTS = {"net": "adam", "aux": "aux_adam"}  # where a checkpoint has them
 _NEEDED = (
     "program",
     "counters",
@@ -86,6 +88,7 @@ class Session:
     bonus: Bonus | None = None
     tutor: Tutor | None = None
     guide: Guide | None = None
+    aux: AuxiliaryLoss | None = None
     update: int = 0
     step_scale: float = 1.0
 
@@ -135,21 +138,23 @@ class Session:
             lengths=np.zeros(config.envs, np.int64),
             led=np.zeros(config.envs, np.bool_),
         )
-        optimizer = torch.optim.Adam(
-            net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
-        )
+        aux = build_auxiliary(config, net)
+        learnt = [*net.parameters(), *(() if aux is None else aux.parameters())]
+        optimizer = torch.optim.Adam(learnt, config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True)
         generator = torch.Generator().manual_seed(config.seed)
         actor = Actor(net, state.tokens.shape[1])
         program = envs.program if program is None else program
-        return cls(config, envs, program, actor, optimizer, state, generator, bonus, tutor, guide)
+        return cls(config, envs, program, actor, optimizer, state, generator, bonus, tutor, guide, aux)
 
     def checkpoint(self) -> Checkpoint:
         """Everything needed to continue exactly."""
         net, program = self.actor.net, self.program
-        tensors: dict[str, Tensor] = {f"net.{name}": value for name, value in net.state_dict().items()}
-        for name, parameter in net.named_parameters():
-            for key, value in self.optimizer.state.get(parameter, {}).items():
-                tensors[f"adam.{key}.{name}"] = value
+        tensors: dict[str, Tensor] = {}
+        for trained, module in self.modules.items():
+            tensors |= {f"{trained}.{name}": value for name, value in module.state_dict().items()}
+            for name, parameter in module.named_parameters():
+                for key, value in self.optimizer.state.get(parameter, {}).items():
+                    tensors[f"{_MOMENTS[trained]}.{key}.{name}"] = value
         for name, part in self._parts_in_json():
             tensors[name] = _json_tensor(name, part.state())
         if self.bonus is not None:
@@ -171,6 +176,11 @@ class Session:
             torch_version=str(torch.__version__),
         )
         return Checkpoint(meta, tensors)
+
+    @property
+    def modules(self) -> dict[str, nn.Module]:
+        """What the optimizer trains, by the names under which a checkpoint has it: the network, an auxiliary loss."""
+        return {"net": self.actor.net} | ({} if self.aux is None else {"aux": self.aux})
 
     def _parts_in_json(self) -> list[tuple[str, Curriculum | Guide]]:
         """Curriculum and guide, if there are any, by the names that their states have in a checkpoint."""
@@ -199,7 +209,13 @@ class Session:
         net = restore_net(checkpoint, spec, config.net, config.code_folder)
         try:
             self.actor.net.load_state_dict(net.state_dict())
-            self._load_adam(checkpoint.part("adam"))
+            if self.aux is not None:
+                state = self.aux.state_dict()
+                self.aux.load_state_dict(
+                    {name: fitting(checkpoint.part("aux"), name, state[name]) for name in state}
+                )
+            for trained, module in self.modules.items():
+                self._load_adam(module, checkpoint.part(_MOMENTS[trained]))
             self._load_state(checkpoint.part("state"))
             self.step_scale = float(
                 fitting(checkpoint.tensors, "step_scale", torch.zeros((), dtype=torch.float64))
@@ -230,8 +246,8 @@ class Session:
                 )
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
-    def _load_adam(self, stored: dict[str, Tensor]) -> None:
-        for name, parameter in self.actor.net.named_parameters():
+    def _load_adam(self, module: nn.Module, stored: dict[str, Tensor]) -> None:
+        for name, parameter in module.named_parameters():
             if not any(f"{key}.{name}" in stored for key in _ADAM):
                 continue  # it had no gradient yet, as an encoder of words before the first word
             # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.

@@ -229,7 +229,10 @@ def unusual(settings: Mapping[str, Any]) -> list[str]:
         return []
     named = [f"net {config.net}"] if config.net != "fast" else []
     named += [f"recipe {config.recipe}"] if config.recipe != "plain" else []
-    told, words = configure(config.recipe, net=config.net).model_dump(), ("bonus", "curriculum", "guide")
+    told, words = (
+        configure(config.recipe, net=config.net).model_dump(),
+        ("bonus", "curriculum", "guide", "aux"),
+    )
     chosen = [name for name in (*words, *HYPER) if getattr(config, name) != told[name]]
     return named + [
         f"{name} {getattr(config, name)}" if name in words else f"{name}={getattr(config, name)}"

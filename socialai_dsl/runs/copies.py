@@ -64,7 +64,7 @@ def keep_run(folder: Path, config: RunConfig, loaded: Loaded) -> RunConfig:
     kept = kept.within(folder)
     phases = Path(config.curriculum)
     beside = phases.parent.resolve() == config.code_folder.resolve()
-    own = any(":" in name for name in (config.net, config.bonus, config.curriculum, config.guide))
+    own = bool(config.own_classes)
     if phases.suffix in SUFFIXES and (beside or not own):
         copy = kept.code_folder / (phases.name if beside else f"{phases.stem}.curriculum.yaml")
         copy.parent.mkdir(parents=True, exist_ok=True)

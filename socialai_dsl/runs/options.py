@@ -36,8 +36,9 @@ _OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
 _OF_PART: Final = {
     "guide": ("guide_share", "imitation_coef"),
     "bonus": ("bonus_c", "bonus_m", "bonus_t", "bonus_formula"),
+    "aux": ("aux_coef",),
 }
-"""Options that mean nothing where a run has no guide, or no bonus."""
+"""Options that mean nothing where a run has no guide, no bonus or no auxiliary loss."""
 
 _MOST_THREADS: Final = 4
 """More threads than this wait for Python's interpreter lock rather than compute."""
@@ -203,9 +204,9 @@ def _refuse_unknown(options: Mapping[str, Any]) -> None:
 def _refuse_idle(given: Iterable[str], config: RunConfig) -> None:
     """Refuse what belongs to something that this run does not have."""
     for name in given:
-        for part in ("guide", "bonus"):
-            if name.removesuffix("_end") in _OF_PART[part] and getattr(config, part) == "none":
-                raise OptionError(name, f"it is for a {part}, and this run has none")
+        for part, options in _OF_PART.items():
+            if name.removesuffix("_end") in options and getattr(config, part) == "none":
+                raise OptionError(name, f"it is for --{part}, and this run has none")
 
 
 def _refuse_training_options(options: Mapping[str, Any]) -> None:

@@ -100,7 +100,7 @@ def test_every_coefficient_has_an_end_of_its_own_bounds_and_goes_there_evenly() 
         "gamma",
         "gae_lambda",
     }
-    assert expected | {"max_grad_norm"} == set(SCHEDULED)
+    assert expected | {"aux_coef", "max_grad_norm"} == set(SCHEDULED)
     assert {name for name in RunConfig.model_fields if name.endswith("_end")} == {
         f"{n}_end" for n in SCHEDULED
     }

@@ -17,8 +17,8 @@ from tests.trainer.fake_envs import EchoEnvs
 from trainer.actions import log_probs_and_entropies
 from trainer.checkpoint import read
 from trainer.config import RunConfig
+from trainer.frames import Batch
 from trainer.guides import Lead, ScriptGuide
-from trainer.minibatch import Batch
 from trainer.play import CheckpointPolicy
 from trainer.ppo import estimate_advantages, ppo_loss, train, update
 from trainer.rollout import collect

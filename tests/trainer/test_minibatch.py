@@ -11,7 +11,8 @@ from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.config import RunConfig
-from trainer.minibatch import Batch, cut_out
+from trainer.frames import Batch
+from trainer.minibatch import cut_out
 from trainer.nets import ActorCritic
 from trainer.nets.memory import emptied
 from trainer.rollout import Rollout, collect
@@ -87,11 +88,11 @@ def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> No
     zeros = torch.zeros(STEPS, ENVS)
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, zeros, zeros)
     minibatch = cut_out(session, rollout, batch, torch.arange(ENVS))
-    shared = len(minibatch.image_index) < STEPS * ENVS
+    shared = len(minibatch.stretches.image_index) < STEPS * ENVS
     assert shared == distinct, "duplicates must be removed exactly where that was asked for"
 
     expected = [by_stretch(array) for array in reference(net, rollout, seen)]
-    ((_, *got),) = minibatch.evaluate(net)
+    ((_, (*got, _, _)),) = minibatch.evaluate(net)
     for one, other in zip(got, expected, strict=True):
         assert one.dtype == torch.float64
         assert furthest(one, other) < 1e-12

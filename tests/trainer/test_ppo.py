@@ -12,7 +12,8 @@ from torch import Tensor
 
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
-from trainer.minibatch import Batch, cut_out
+from trainer.frames import Batch
+from trainer.minibatch import cut_out
 from trainer.ppo import compute_gae, estimate_advantages, ppo_loss, update
 from trainer.rollout import collect
 from trainer.session import Session
@@ -267,7 +268,7 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
     batch = estimate_advantages(config, rollout)
     for envs in (torch.tensor([0, 3, 5]), torch.tensor([1, 2, 4, 6, 7])):
         minibatch = cut_out(session, rollout, batch, envs)
-        ((_, logits, values),) = minibatch.evaluate(session.actor.net)
+        ((_, (logits, values, _, _)),) = minibatch.evaluate(session.actor.net)
         assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
         parts = ppo_loss(minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config)
         assert parts.approx_kl.item() == pytest.approx(0, abs=1e-6)
@@ -284,8 +285,8 @@ def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) ->
     assert got.tolist() == [
         [t * 100.0 + 5, t * 100.0 + 2, (t + 4) * 100.0 + 5, (t + 4) * 100.0 + 2] for t in range(4)
     ]
-    assert torch.equal(minibatch.memory[:2], rollout.memories[0][[5, 2]])
-    assert torch.equal(minibatch.memory[2:], rollout.memories[1][[5, 2]])
+    assert torch.equal(minibatch.stretches.memory[:2], rollout.memories[0][[5, 2]])
+    assert torch.equal(minibatch.stretches.memory[2:], rollout.memories[1][[5, 2]])
 
 
 def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
@@ -300,7 +301,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     update(session, rollout)
     group = torch.arange(config.envs)
     minibatch = cut_out(session, rollout, estimate_advantages(config, rollout), group)
-    ((_, logits, _),) = minibatch.evaluate(session.actor.net)
+    ((_, (logits, *_)),) = minibatch.evaluate(session.actor.net)
     chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]
     assert chosen.mean().item() > before
 
@@ -321,7 +322,7 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
     scaled = (gains - gains.mean()) / (gains.std(correction=0) + 1e-8)
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, scaled, gains + rollout.values)
     everything = cut_out(session, rollout, batch, torch.arange(8))
-    ((_, logits, values),) = everything.evaluate(twin)
+    ((_, (logits, values, _, _)),) = everything.evaluate(twin)
     loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config)
     loss.loss.backward()  # type: ignore[no-untyped-call]
     norm = torch.nn.utils.clip_grad_norm_(twin.parameters(), config.max_grad_norm)
@@ -369,10 +370,8 @@ def test_the_step_that_leaves_the_trust_region_is_taken_back(
 def test_steps_get_longer_again_up_to_the_schedule(small_config: Any) -> None:
     session, rollout = played(small_config(target_kl=1e6, lr=1e-3))
     session.step_scale = 0.7
-    update(session, rollout)
-    assert session.learning_rate == pytest.approx(0.875e-3)
-    update(session, rollout)
-    assert session.learning_rate == pytest.approx(1e-3)
+    rates = [update(session, rollout)["learning_rate"] for _ in range(3)]
+    assert rates == pytest.approx([0.7e-3, 0.875e-3, 1e-3])
 
 
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:

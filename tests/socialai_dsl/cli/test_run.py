@@ -302,7 +302,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(trained: Path, capsys: Capture) 
         (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
         (
             ["corridor.yaml", "--hyper", "banana=1"],
-            "'banana'; expected one of guide_share, imitation_coef, horizon,",
+            "'banana'; expected one of guide_share, imitation_coef, aux_coef, horizon,",
         ),
         (["corridor.yaml", "--hyper", "envs=3"], "envs has an option of its own, --envs"),
         (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),
@@ -495,6 +495,30 @@ def test_unwritable_output(capsys: Capture) -> None:
     Path("file").write_text("")
     assert run_main(["corridor.yaml", *QUICK, "--out", "file/run"]) == 2
     assert "file/run" in capsys.readouterr().err
+
+
+def test_a_loss_of_ones_own_that_is_not_finite_ends_the_run_and_loses_nothing(capsys: Capture) -> None:
+    """In the third update; the checkpoint after the second is there, and so are its rows."""
+    Path("mine.py").write_text(
+        "import torch\n"
+        "from trainer.auxiliary import AuxiliaryLoss\n"
+        "class Loss(AuxiliaryLoss):\n"
+        "    def __init__(self, config, net):\n"
+        "        super().__init__(config, net)\n"
+        "        self.register_buffer('begun', torch.zeros(()))\n"
+        "    def begin(self, played, net, generator):\n"
+        "        self.begun += 1\n"
+        "    def forward(self, frames, outputs, net):\n"
+        "        return outputs.values.mean() / (self.begun < 3)\n"
+    )
+    given = ["--aux", "mine:Loss", "--frames", "1024", "--envs", "8", "--checkpoint-every", "1"]
+    assert run_main(["corridor.yaml", *given, "--out", "run"]) == 2
+    said = capsys.readouterr().err
+    assert "aux: Loss returned " in said
+    assert "expected a finite scalar tensor of float32" in said
+    assert "Traceback" not in said
+    assert sorted(path.stem for path in Path("run/checkpoints").iterdir())[-1] == f"{512:015d}"
+    assert len(Path("run/metrics.jsonl").read_text().splitlines()) == 2
 
 
 def test_an_error_in_code_of_ones_own_names_its_place(capsys: Capture) -> None:

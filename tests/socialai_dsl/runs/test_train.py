@@ -56,7 +56,7 @@ def test_an_agent_that_is_not_trained(tmp_path: Path) -> None:
         ({"device": "tpu"}, "device: got 'tpu', expected auto, cpu or cuda"),
         ({"agent": "nobody"}, "agent: expected ppo, random, oracle, human, shipped or"),
         ({"agent": "random", "frames": 10}, "frames: the agent 'random' is not trained"),
-        ({"recipe": "plain", "guide_share": 0.2}, "guide_share: it is for a guide, and this run has none"),
+        ({"recipe": "plain", "guide_share": 0.2}, "guide_share: it is for --guide, and this run has none"),
         ({"recipe": "wild"}, "recipe: got 'wild', expected one of plain"),
     ],
 )
