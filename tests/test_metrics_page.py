@@ -10,7 +10,7 @@ import socialai_dsl
 from socialai_dsl import evaluate
 from socialai_dsl.episodes.players import Player
 from trainer.config import RunConfig
-from trainer.ppo import train
+from trainer.training import train
 
 PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
 

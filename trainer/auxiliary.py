@@ -19,7 +19,7 @@ class AuxiliaryLoss(nn.Module, ABC):
     """A loss that is added to PPO's, `aux_coef` times; `--aux mine:Loss` builds `Loss(config, net)`.
 
     The optimizer trains its parameters along with the network's. Checkpoints save its whole state, which is that of a
-    module: parameters and buffers, of shapes that do not change.
+    module: parameters, and buffers, which may grow.
 
     Args:
         config: every option of the run.

@@ -65,7 +65,7 @@ class Checkpoint:
     """A checkpoint in memory: metadata, and tensors by dotted name.
 
     Names: `net.*`, `adam.*`, `state.*`, `step_scale`, `rng`, `envs`, and where there is one `curriculum`, `guide`,
-    `bonus.*`, `aux.*` with `aux_adam.*`.
+    `bonus.*`, `aux.*` with `aux_adam.*`, `algorithm.*`.
     """
 
     meta: CheckpointMeta

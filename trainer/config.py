@@ -71,6 +71,7 @@ class _Starts(BaseModel):
         "fast, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the paper's network, update "
         "and numbers",
     )
+    algorithm: Name = _flag("ppo", "how the network learns: ppo or mine:Algorithm")
     precision: Literal["float32", "bfloat16"] = _flag("float32", "numbers of the convolutions of `paper`")
     bonus: Name = _flag(
         "none",
@@ -155,7 +156,7 @@ class _Starts(BaseModel):
     )
 
 
-OWN: Final = ("net", "bonus", "curriculum", "guide", "aux")
+OWN: Final = ("net", "bonus", "curriculum", "guide", "aux", "algorithm")
 """Options that may name a class of the user's own, such as `mine:Net`."""
 
 SCHEDULED: Final = tuple(
@@ -227,6 +228,11 @@ class RunConfig(_Options):
         return self.agent == LEARNS
 
     @property
+    def player(self) -> str:
+        """Who plays: the algorithm that trains an agent, or the agent that is not trained."""
+        return self.algorithm if self.trains else self.agent
+
+    @property
     def frames_per_update(self) -> int:
         """Frames collected before each update."""
         return self.envs * self.horizon
@@ -255,7 +261,7 @@ class RunConfig(_Options):
     @property
     def depends_on_frames(self) -> bool:
         """Whether an update depends on how many frames the run will have, so that more of them are another run."""
-        return bool(self.ends) or self.guide != "none" or ":" in self.bonus
+        return bool(self.ends) or self.guide != "none" or ":" in self.bonus or ":" in self.algorithm
 
     def differences(self, other: RunConfig) -> list[str]:
         """The options that keep a run with these from going on with the other ones."""

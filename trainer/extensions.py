@@ -1,4 +1,4 @@
-"""Loads the user's own networks, bonuses, curricula and guides: `mine:Net` is class `Net` of `mine.py`."""
+"""Loads the user's own classes: `mine:Net` is class `Net` of `mine.py`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,11 @@ def load_class(name: str, option: str, shipped: Sequence[str], needed: type, fol
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
         raise ValueError(f"{option}: {file} has no class {class_name!r}")
-    methods = [name for name, method in vars(needed).items() if isfunction(method) and name[0] != "_"]
+    methods = [
+        name
+        for name, method in vars(needed).items()
+        if name[0] != "_" and (isfunction(method) or isinstance(method, staticmethod))
+    ]
     lacking = [method for method in methods if not callable(getattr(found, method, None))]
     lacking += sorted(getattr(found, "__abstractmethods__", ()))
     if lacking:

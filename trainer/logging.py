@@ -77,7 +77,7 @@ class Metrics:
             **episode_metrics(tally, before, self._counted),
         }
         if config.guide == "none":
-            del row["imitation_loss"]
+            row.pop("imitation_loss", None)  # algorithms have figures of their own
             return row
         agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
         return row | {"led": tally.led_steps / config.frames_per_update, "agreement": agreement}

@@ -33,21 +33,27 @@ def cut_out(
     session: Session, rollout: Rollout, batch: Batch, envs: Tensor, weight: float = 1.0
 ) -> Environments:
     """The environments `envs`, int64 (B,), of a rollout, in stretches of `bptt` steps side by side."""
-    actor, stretch = session.actor, session.config.bptt or session.config.horizon
+    frames = batch.pick(lambda array: cut(session, array, envs).flatten(0, 1))
+    return Environments(frames, stretches_of(session, rollout, envs), weight)
 
-    def cut(array: Tensor) -> Tensor:
-        """(T, E, ...) to (stretch, T / stretch * B, ...), the stretches of one time side by side."""
-        chosen = array.index_select(1, envs.to(array.device))
-        return chosen.view(-1, stretch, *chosen.shape[1:]).transpose(0, 1).flatten(1, 2)
 
-    pair_rows, frame_index = np.unique(cut(rollout.pair_rows).numpy(), return_inverse=True)
-    stretches = Stretches.of(
+def stretches_of(session: Session, rollout: Rollout, envs: Tensor) -> Stretches:
+    """What the environments `envs`, int64 (B,), of a rollout have seen, in the order of `cut`."""
+    actor = session.actor
+    pair_rows, frame_index = np.unique(cut(session, rollout.pair_rows, envs).numpy(), return_inverse=True)
+    return Stretches.of(
         actor.net,
-        cut(rollout.starts),
+        cut(session, rollout.starts, envs),
         rollout.memories.index_select(1, envs.to(actor.device)).flatten(0, 1),
         actor.images.data,
         actor.histories.data,
         actor.pairs.data[pair_rows],
         frame_index,
     )
-    return Environments(batch.pick(lambda array: cut(array).flatten(0, 1)), stretches, weight)
+
+
+def cut(session: Session, array: Tensor, envs: Tensor) -> Tensor:
+    """(T, E, ...) to (S, T / S * B, ...): stretches of S = `bptt` steps, those of one time side by side."""
+    chosen = array.index_select(1, envs.to(array.device))
+    steps = session.config.bptt or session.config.horizon
+    return chosen.view(-1, steps, *chosen.shape[1:]).transpose(0, 1).flatten(1, 2)

@@ -8,44 +8,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.factory import make
-from socialai_dsl.episodes.policies import Observation, Streams
-from trainer import actions as heads
+from socialai_dsl.episodes.policies import Observation, Policy
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta
 from trainer.config import scenario_in
 from trainer.errors import CheckpointError
-from trainer.features import Actor, Int64
-from trainer.nets import ActorCritic, NetSpec
-from trainer.nets.memory import emptied
+from trainer.features import Int64
+from trainer.nets import NetSpec
 from trainer.shipped import located
+from trainer.training import restore_algorithm
 
-# Encodings kept before they are made anew, so that endless play does not fill the memory.
-_REMEMBERED_FRAMES = 1 << 16
 _WORDS_SHOWN = 6
 
 
 class CheckpointPolicy:
-    """A trained agent: a network with its memory, which plays one environment or many.
+    """A trained agent, which plays as its algorithm plays with a network; `load` makes one.
 
-    It samples its actions, as in the paper, or takes the most probable ones if `greedy`. The network is in evaluation
-    mode, so batch normalisation uses the statistics of training, and the actions in one environment do not depend on
-    the others (except for the rounding of matrix products). `load` makes one.
+    That of PPO samples its actions, as in the paper, or takes the most probable ones if `greedy`; see
+    `trainer.policy.NetPolicy`.
 
     Attributes:
-        net: the network, a `torch.nn.Module`.
+        policy: what plays.
     """
 
-    def __init__(self, net: ActorCritic, greedy: bool = False, seed: int = 0) -> None:
-        self.net = net.eval()
-        self._greedy = greedy
-        self._streams = Streams(seed)
-        self._actor: Actor | None = None
-        self._memory = net.memory.initial(1)
-        self._last: tuple[torch.Tensor, torch.Tensor] | None = None
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
 
     @classmethod
     def load(
@@ -57,6 +47,7 @@ class CheckpointPolicy:
         device: str = "cpu",
         net: str | None = None,
         folder: Path = Path(),
+        algorithm: str | None = None,
     ) -> CheckpointPolicy:
         """Load an agent to play `envs`; a `TransferWarning` lists how they differ from the ones it was trained on.
 
@@ -68,6 +59,7 @@ class CheckpointPolicy:
             device: PyTorch's name of the device that the network runs on.
             net: `module:Class` of a network of your own; no file chooses what is imported.
             folder: the folder whose `module.py` is tried first.
+            algorithm: `module:Class` of an algorithm of your own, for which the same holds.
 
         Raises:
             CheckpointError: the file is missing, damaged or of another version of the trainer, or does not fit the
@@ -81,60 +73,23 @@ class CheckpointPolicy:
                 raise CheckpointError(f"{path}: does not say which scenario it is for, expected envs")
             envs = make(scenario)
         restored = checkpoints.restore_net(checkpoint, NetSpec.of(envs.unwrapped), net, folder)
+        found = restore_algorithm(checkpoint, algorithm, folder)
         warn_of_differences(checkpoint.meta, envs.unwrapped.program)
-        return cls(restored.to(device), greedy, seed)
+        return cls(found.policy(restored.to(device), greedy, seed))
 
     def reset(self, mask: NDArray[np.bool_] | None = None, episodes: Int64 | None = None) -> None:
         """Forget the past where a new episode begins, `mask` bool (E,), or everywhere; see `Policy.reset`."""
-        if mask is None:
-            mask = np.ones(len(self._memory), np.bool_)
-        self._require(len(mask))
-        self._memory = emptied(self._memory, torch.from_numpy(mask).to(self._memory.device))
-        self._streams.begin(mask, episodes)
+        self.policy.reset(mask, episodes)  # type: ignore[arg-type]
 
-    @torch.no_grad()
     def act(self, observation: Observation) -> Int64:
         """Choose actions, int64 (E, heads), as `Policy.act` does; of a single observation one, int64 (heads,)."""
-        alone = observation["tokens"].ndim == 1
-        logits, _ = self._look(observation, alone)
-        if not self._greedy:
-            noise = torch.from_numpy(self._streams.gumbel(*logits.shape))
-            logits = logits + noise.to(logits.device)
-        chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
-        return chosen[0] if alone else chosen
+        return self.policy.act(observation)  # type: ignore[return-value]
 
-    def thought(self) -> tuple[list[list[float]], float]:
-        """What the agent made of the first room's last observation.
-
-        Returns:
-            For each head the probability of each of its choices, and the expected return.
-
-        Raises:
-            ValueError: `act` was not called yet.
-        """
-        if self._last is None:
-            raise ValueError("thought: got a call before `act`; expected one after it")
-        logits, values = self._last
-        parts = torch.split(logits[0], list(self.net.spec.action_sizes))
-        return [torch.softmax(part, -1).tolist() for part in parts], float(values[0])
-
-    def _look(self, observation: Observation, alone: bool) -> tuple[torch.Tensor, torch.Tensor]:
-        """Logits of all heads side by side (E, A), and values (E,); the memory goes on."""
-        images, tokens = observation["image"], observation["tokens"]
-        if alone:
-            images, tokens = images[None], tokens[None]
-        self._require(len(tokens))
-        if self._actor is None or len(self._actor.pairs.data) > _REMEMBERED_FRAMES:
-            self._actor = Actor(self.net, tokens.shape[1])
-        _, features = self._actor.see(images, tokens)
-        output, self._memory = self.net.memory.step(features, self._memory)
-        self._last = self.net.heads(output)
-        return self._last
-
-    def _require(self, count: int) -> None:
-        """Begin with an empty memory if another number of environments is played now."""
-        if len(self._memory) != count:
-            self._memory, self._actor = self.net.memory.initial(count), None
+    def __getattr__(self, name: str) -> Any:
+        """Whatever else the policy has, such as `thought` and `net` of a network's."""
+        if name == "policy":  # of a copy that has no attributes yet
+            raise AttributeError(name)
+        return getattr(self.policy, name)
 
 
 def _scenario_of(agent: Path, scenario: str) -> str:

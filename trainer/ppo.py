@@ -1,4 +1,4 @@
-"""Proximal policy optimisation, top to bottom: advantages, loss, update of a rollout, training loop.
+"""Proximal policy optimisation, top to bottom: advantages, loss, update of a rollout, the algorithm.
 
 Sources: Schulman et al. 2017 (PPO), Schulman et al. 2016 (GAE). Axes: T steps of a rollout, E environments, N frames of
 a minibatch, H heads, A choices of all of them side by side.
@@ -7,9 +7,8 @@ a minibatch, H heads, A choices of all of them side by side.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -19,12 +18,12 @@ from trainer.auxiliary import loss_of
 from trainer.chunks import Chunks, chunks
 from trainer.config import RunConfig
 from trainer.errors import require_finite
-from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.frames import Batch, Environments
-from trainer.logging import Metrics, MetricsLog, Tracker
 from trainer.minibatch import cut_out, environments
+from trainer.nets import ActorCritic
+from trainer.policy import NetPolicy
 from trainer.rollout import Rollout, collect
-from trainer.session import Mapper, Session, explained_stops, threads_of
+from trainer.session import Mapper, Session
 
 # -- advantages ---------------------------------------------------------------------------------------------------
 
@@ -304,64 +303,31 @@ def _sum(parameter: Tensor, gradients: Sequence[Tensor | None]) -> Tensor | None
     return torch.empty_like(parameter).copy_(functools.reduce(torch.add, present)) if present else None
 
 
-# -- training loop ------------------------------------------------------------------------------------------------
+# -- the algorithm ------------------------------------------------------------------------------------------------
 
 
-def train(
-    config: RunConfig,
-    envs: Any,
-    run_dir: Path | str,
-    progress: Callable[[Mapping[str, Any]], None] = lambda row: None,
-    resume: bool = False,
-    tracker: Tracker | None = None,
-    program: Any = None,
-    stop: Callable[[], bool] = lambda: False,
-) -> Path:
-    """Train a network and return the path of its final checkpoint.
+class Ppo:
+    """Proximal policy optimisation as an algorithm; see `Algorithm`. All that it remembers is the session's."""
 
-    Writes `starts.jsonl`, `metrics.jsonl`, TensorBoard events and `checkpoints/` into `run_dir`. A resumed run
-    continues from the newest intact checkpoint as if it had never stopped: the same weights to the bit on the same
-    CPU with the same number of threads.
+    def __init__(self, session: Session) -> None:
+        self._session = session
 
-    Args:
-        config: every option of the run.
-        envs: what `socialai_dsl.make_vec(..., autoreset_mode="SameStep")` returns, not yet reset.
-        run_dir: directory of the run, made if missing; only a resumed one holds a run already.
-        progress: called after every update with its row, as in `metrics.jsonl`.
-        resume: continue the run in `run_dir`.
-        tracker: sends the figures elsewhere as well.
-        program: of the scenario that the agent is for, where a guide plays a variant of it; by default that of `envs`.
-        stop: asked before every update; where it is true, training ends early, and a resumed run goes on from there.
+    def collect(self) -> Rollout:
+        """Play as the policy samples."""
+        return collect(self._session)
 
-    Raises:
-        ValueError: configuration and environments do not fit, something of the user's returned what it must not, the
-            directory holds another run, or the tracker cannot begin.
-        CheckpointError: there is nothing to resume, or it is damaged or of another run.
-        TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint is
-            intact.
-    """
-    run_dir = Path(run_dir)
-    session = Session.start(config, envs, program)
-    if not resume and checkpoint_files(run_dir / CHECKPOINTS):
-        raise ValueError(f"run_dir: {run_dir} holds a run already; resume it, or choose another folder")
-    if resume:
-        session.resume(run_dir)
-    with (
-        explained_stops(session, run_dir),
-        MetricsLog(run_dir, config, session.update, tracker) as log,
-        threads_of(session) as mapper,
-    ):
-        if not resume:
-            session.save(run_dir)
-        metrics = Metrics(session)
-        while session.update < config.updates and not stop():
-            rollout = collect(session)
-            losses = update(session, rollout, mapper)
-            session.update += 1
-            row = metrics.row(rollout.tally, losses)
-            log.write(row)
-            if session.update % config.checkpoint_every == 0 and session.update < config.updates:
-                log.sync()
-                session.save(run_dir)
-            progress(row)
-        return session.save(run_dir)
+    def update(self, played: Rollout) -> dict[str, float | None]:
+        """See `update`."""
+        return update(self._session, played, self._session.mapper)
+
+    def state(self) -> dict[str, Tensor]:
+        """Nothing."""
+        return {}
+
+    def load_state(self, state: Mapping[str, Tensor]) -> None:
+        """Nothing."""
+
+    @staticmethod
+    def policy(net: ActorCritic, greedy: bool, seed: int) -> NetPolicy:
+        """What samples the network's actions, or takes the most probable ones."""
+        return NetPolicy(net, greedy, seed)

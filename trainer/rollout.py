@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,10 +52,15 @@ class Rollout(NamedTuple):
 
 
 @torch.no_grad()
-def collect(session: Session) -> Rollout:
+def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) -> Rollout:
     """Play `horizon` steps in every environment; `session.state` is advanced in place.
 
+    Args:
+        session: the run.
+        choose: makes actions, int64 (E, H), of the network's logits (E, A); by default the policy samples.
+
     Raises:
+        ValueError: something of the user's returned what it must not.
         ObservationError: an observation is outside its bounds.
         TrainingStopped: a reward or an output of the network is not finite.
     """
@@ -74,7 +80,8 @@ def collect(session: Session) -> Rollout:
         logits, values = net.heads(output)  # (E, A), (E,)
         require_shape("net: logits of heads", logits, shape[1:])
         require_shape("net: values of heads", values, shape[1:2])
-        actions = heads.choose(logits + noise[t], sizes)  # (E, H)
+        actions = heads.choose(logits + noise[t], sizes) if choose is None else choose(logits)  # (E, H)
+        require_shape("algorithm: the actions chosen", actions, (config.envs, len(sizes)))
         if session.guide is not None:
             actions, given = _follow(session, session.guide, actions, tally)
             leads.append(given)

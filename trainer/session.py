@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from trainer import checkpoint as checkpoints
+from trainer.algorithm import Algorithm
 from trainer.auxiliary import AuxiliaryLoss, build_auxiliary
 from trainer.bonus import Bonus, build_bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
@@ -76,6 +77,8 @@ class Session:
         update: updates made.
         step_scale: factor of the learning rate; below 1 after updates that left the trust region.
         generator: the one source of the trainer's randomness.
+        algorithm: plays and learns, once the run has begun.
+        mapper: does the work of threads; `map` where there is one.
     """
 
     config: RunConfig
@@ -89,8 +92,10 @@ class Session:
     tutor: Tutor | None = None
     guide: Guide | None = None
     aux: AuxiliaryLoss | None = None
+    algorithm: Algorithm | None = None
     update: int = 0
     step_scale: float = 1.0
+    mapper: Mapper = map
 
     @property
     def frames(self) -> int:
@@ -159,6 +164,8 @@ class Session:
             tensors[name] = _json_tensor(name, part.state())
         if self.bonus is not None:
             tensors |= _array_tensors("bonus", self.bonus.state())
+        if self.algorithm is not None:
+            tensors |= _array_tensors("algorithm", self.algorithm.state())
         for name, value in vars(self.state).items():
             tensors[f"state.{name}"] = torch.as_tensor(value)
         tensors["step_scale"] = torch.tensor(self.step_scale, dtype=torch.float64)
@@ -210,10 +217,7 @@ class Session:
         try:
             self.actor.net.load_state_dict(net.state_dict())
             if self.aux is not None:
-                state = self.aux.state_dict()
-                self.aux.load_state_dict(
-                    {name: fitting(checkpoint.part("aux"), name, state[name]) for name in state}
-                )
+                self._load_auxiliary(self.aux, checkpoint.part("aux"))
             for trained, module in self.modules.items():
                 self._load_adam(module, checkpoint.part(_MOMENTS[trained]))
             self._load_state(checkpoint.part("state"))
@@ -223,6 +227,8 @@ class Session:
             self.generator.set_state(checkpoint.tensors["rng"])
             if self.bonus is not None:
                 self.bonus.load_state({k: v.numpy() for k, v in checkpoint.part("bonus").items()})
+            if self.algorithm is not None:
+                self.algorithm.load_state(checkpoint.part("algorithm"))
             self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
             for name, part in self._parts_in_json():
                 part.load_state(json.loads(checkpoint.tensors[name].numpy().tobytes()))
@@ -242,9 +248,16 @@ class Session:
             detail = ", ".join(f"{name}: {getattr(old, name)} -> {getattr(new, name)}" for name in changed)
             if changed == ["frames"]:
                 detail += (
-                    " (guide, schedules and a bonus of one's own reach from the first frame to the last)"
+                    " (guide, schedules, own bonus and own algorithm reach from the first frame to the last)"
                 )
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
+
+    def _load_auxiliary(self, aux: AuxiliaryLoss, stored: dict[str, Tensor]) -> None:
+        parameters = dict(aux.named_parameters())
+        for name, present in aux.state_dict(keep_vars=True).items():
+            # Buffers may have grown.
+            found = fitting(stored, name, present) if name in parameters else stored[name]
+            present.data = found.to(present.device, copy=True)
 
     def _load_adam(self, module: nn.Module, stored: dict[str, Tensor]) -> None:
         for name, parameter in module.named_parameters():

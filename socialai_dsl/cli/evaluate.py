@@ -26,7 +26,17 @@ from socialai_dsl.runs.folder import EVALUATIONS, REPLAY, RESULT
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 
-_OPTIONS: Final = ("greedy", "seed", "device", "net", "participant", "view", *TELL_OPTIONS, *MODEL_OPTIONS)
+_OPTIONS: Final = (
+    "greedy",
+    "seed",
+    "device",
+    "net",
+    "algorithm",
+    "participant",
+    "view",
+    *TELL_OPTIONS,
+    *MODEL_OPTIONS,
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,6 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the network runs (default: auto)",
     )
     parser.add_argument("--net", metavar="mine:Net", help="import this code, for a network of your own")
+    parser.add_argument(
+        "--algorithm", metavar="mine:Algorithm", help="import this code, for an algorithm of your own"
+    )
     parser.add_argument(
         "--out",
         type=Path,

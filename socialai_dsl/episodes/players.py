@@ -44,7 +44,8 @@ class Player:
         greedy: whether a network takes its most probable action instead of sampling.
         seed: of what a network or `random` draws; rooms do not depend on it.
         net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
-        folder: where the file of such a network is looked for first.
+        algorithm: name of an algorithm that does not ship, likewise.
+        folder: where the files of these are looked for first.
         out: where what a person or a language model plays is kept, by default in `runs`.
         options: how a language model is asked.
         tell, goal, language: what a language model or a person is told of the task, see `brief`; others read nothing.
@@ -61,6 +62,7 @@ class Player:
     greedy: bool = False
     seed: int = 0
     net: str | None = None
+    algorithm: str | None = None
     folder: Path = Path()
     out: Path | None = None
     options: ModelOptions | None = None
@@ -165,7 +167,14 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         policy = CheckpointPolicy.load(
-            player.agent, envs, player.greedy, player.seed, player.device, player.net, player.folder
+            player.agent,
+            envs,
+            player.greedy,
+            player.seed,
+            player.device,
+            player.net,
+            player.folder,
+            player.algorithm,
         )
     return policy, [str(warning.message) for warning in caught]
 

@@ -200,7 +200,8 @@ def _scenario_digest(folder: Path) -> str:
 
 def _column(settings: Mapping[str, Any]) -> str:
     """Who played, and what of it is not the default."""
-    return ", ".join([str(settings.get("agent", "ppo")), *unusual(settings)])
+    who = str(settings.get("agent", "ppo"))
+    return ", ".join([str(settings.get("algorithm", who)) if who == "ppo" else who, *unusual(settings)])
 
 
 def _granted(result: ResultRecord | None) -> Iterator[str]:

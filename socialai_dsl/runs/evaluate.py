@@ -45,7 +45,7 @@ from socialai_dsl.runs.versions import versions
 from socialai_dsl.traces.endings import short_name
 from trainer.config import RunConfig
 
-_PLAYER: Final = ("greedy", "seed", "device", "net")
+_PLAYER: Final = ("greedy", "seed", "device", "net", "algorithm")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))
 _TOLD: Final = ("tell", "goal", "language")
 _OF_KINDS: Final[dict[str, tuple[str, ...]]] = {
@@ -82,9 +82,9 @@ def evaluate(
         record: up to how many successes, and how many failures, are filmed there.
         trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
             that they show what can be learnt within a session. A person remembers all of a session in any case.
-        options: of a trained agent `greedy`, `seed`, `device` and `net`, of `random` the `seed`; of a language model
-            those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`, see `Player`;
-            of a person `view`, and `participant`, with which the name of the session's folder begins.
+        options: of a trained agent `greedy`, `seed`, `device`, `net` and `algorithm`, of `random` the `seed`; of a
+            language model those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`,
+            see `Player`; of a person `view`, and `participant`, with which the name of the session's folder begins.
 
     Raises:
         ScenarioError: the scenario has mistakes.

@@ -115,8 +115,8 @@ def write_agent(
     # Paths of this machine stay here.
     kept = {"scenario": moved.scenario, "curriculum": _without_place(config.curriculum), "wandb": None}
     written = config.model_copy(update=kept).within(Path())
-    code = config.own_files.get("net")
-    if code is not None:
+    for option in config.own_files.keys() & {"net", "algorithm"}:
+        code = config.own_files[option]
         there = out / written.code_folder / code.relative_to(config.code_folder.resolve())
         there.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(code, there)

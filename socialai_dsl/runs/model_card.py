@@ -37,7 +37,7 @@ def model_card(
     parts = [
         f"---\n{yaml.safe_dump(_front_matter(name, config, result), sort_keys=False, allow_unicode=True)}---",
         f"# {name}",
-        f"A recurrent PPO agent for the social grid-world `{config.scenario}`: {about.strip()} "
+        f"{_kind(config)} for the social grid-world `{config.scenario}`: {about.strip()} "
         f"It was trained for {result['frames']:,} frames with the network `{config.net}`.",
         "## Evaluation",
         _evaluation(result["eval"]),
@@ -59,6 +59,14 @@ def model_card(
         _LIMITS,
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _kind(config: RunConfig) -> str:
+    return (
+        "A recurrent PPO agent"
+        if config.algorithm == "ppo"
+        else f"An agent of the algorithm `{config.algorithm}`"
+    )
 
 
 _LIMITS: Final = """\
@@ -84,7 +92,7 @@ def _front_matter(name: str, config: RunConfig, result: Mapping[str, Any]) -> di
     return {
         "library_name": "socialai-dsl",
         "pipeline_tag": "reinforcement-learning",
-        "tags": ["reinforcement-learning", "gymnasium", "ppo", "socialai", scenario],
+        "tags": ["reinforcement-learning", "gymnasium", config.algorithm, "socialai", scenario],
         "model-index": [
             {
                 "name": name,
@@ -144,14 +152,15 @@ def _place(agent: str) -> str:
 
 def _snippet(config: RunConfig, agent: str) -> str:
     """Code that plays one episode; a test runs it."""
-    own = ":" in config.net
-    net = f", net={_quoted(config.net)}, folder=Path({_quoted(config.code_folder.as_posix())})" if own else ""
+    own = {option: name for option, name in config.own_classes.items() if option in ("net", "algorithm")}
+    code = "".join(f", {option}={_quoted(name)}" for option, name in own.items())
+    code += f", folder=Path({_quoted(config.code_folder.as_posix())})" if own else ""
     return f"""\
 {"from pathlib import Path" + chr(10) * 2 if own else ""}import socialai_dsl as sd
 from trainer.play import CheckpointPolicy
 
 env = sd.make({_quoted(config.scenario)})
-agent = CheckpointPolicy.load({_quoted(agent)}, env{net})
+agent = CheckpointPolicy.load({_quoted(agent)}, env{code})
 observation, info = env.reset(seed=0)
 agent.reset()
 ended = False

@@ -30,7 +30,7 @@ AUTOMATIC: Final[Mapping[str, str]] = {
 OPTIONS: Final = (*FLAGS, *HYPER, "recipe")
 """The names of all options that a user may give."""
 
-_OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
+_OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net", "algorithm")
 """Options that matter to agents that are not trained."""
 
 _OF_PART: Final = {
@@ -96,7 +96,7 @@ def continued_config(config: RunConfig, options: Mapping[str, Any], folder: Path
         name, reason = changed[0], "because a run goes on with the options it began with"
         if name == "frames":
             reason = (
-                "because its guide, its schedules or its own bonus reach from the first frame to the last"
+                "because guide, schedules, own bonus or own algorithm reach from the first frame to the last"
             )
         raise OptionError(name, f"got {getattr(asked, name)}, expected {getattr(config, name)}, {reason}")
     return asked
@@ -214,5 +214,5 @@ def _refuse_training_options(options: Mapping[str, Any]) -> None:
     for name in options:
         if name not in _OF_ANY_AGENT:
             raise OptionError(name, f"the agent {agent!r} is not trained")
-        if agent in UNTRAINED and name in ("device", "net"):
+        if agent in UNTRAINED and name in ("device", "net", "algorithm"):
             raise OptionError(name, f"the agent {agent!r} has no network")

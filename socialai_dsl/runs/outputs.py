@@ -50,7 +50,7 @@ def draw_curve(config: RunConfig, folder: Path, result: dict[str, Any]) -> None:
 
     test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
     curve = read_curve(folder / METRICS, result["eval"]["endings"], test)
-    title = f"{scenario_folder_name(config.scenario)}, {config.agent}, seed {config.seed}"
+    title = f"{scenario_folder_name(config.scenario)}, {config.player}, seed {config.seed}"
     draw_learning_curve(curve, title, folder / CURVE)
 
 

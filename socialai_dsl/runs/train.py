@@ -208,15 +208,23 @@ def _perform(
         training = training_figures(folder)
     # What is trained differs by its training; what is not, by what it draws.
     drawn = 0 if config.trains else config.seed
-    player = Player(agent, config.device, seed=drawn, net=config.net, folder=config.code_folder, out=folder)
+    player = Player(
+        agent,
+        config.device,
+        seed=drawn,
+        net=config.net,
+        algorithm=config.algorithm,
+        folder=config.code_folder,
+        out=folder,
+    )
     played = play_test_set(player, config.played, loaded, program, config.eval_episodes)
     evaluation = replace(played, folder=folder, kept=config.scenario)
     for warning in evaluation.warnings:
         warnings.warn(warning, stacklevel=3)
     told = {"recipe": config.recipe, "guide": config.guide} if config.trains else {}
     result = result_of(evaluation, **told, **training)
-    result |= {"agent": short_name(config.agent), "seed": config.seed}  # of the training, if there was one
-    record_run(evaluation, folder, f"agent {short_name(config.agent)}, seed {config.seed}")
+    result |= {"agent": short_name(config.player), "seed": config.seed}  # of the training, if there was one
+    record_run(evaluation, folder, f"agent {short_name(config.player)}, seed {config.seed}")
     if config.trains:
         draw_curve(config, folder, result)
         write_card(config, loaded, folder, Path(agent), result)
@@ -235,7 +243,7 @@ def _train(
         KeyboardInterrupt: with a message that says how to go on.
     """
     from trainer.errors import TrainingStopped
-    from trainer.ppo import train
+    from trainer.training import train
 
     played = _played(config, loaded)
     scenario = program if played is loaded else compiled(played)

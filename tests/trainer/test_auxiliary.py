@@ -15,9 +15,10 @@ from trainer.config import RunConfig
 from trainer.frames import Environments, Outputs, Stretches
 from trainer.minibatch import cut_out
 from trainer.nets import ActorCritic
-from trainer.ppo import estimate_advantages, train, update
+from trainer.ppo import estimate_advantages, update
 from trainer.rollout import collect
 from trainer.session import Session
+from trainer.training import train
 
 MINE = """
 import torch

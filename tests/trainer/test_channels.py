@@ -10,7 +10,7 @@ from trainer.checkpoint import read, restore_net
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError
 from trainer.nets import NetSpec
-from trainer.ppo import train
+from trainer.training import train
 
 PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
 

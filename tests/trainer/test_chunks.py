@@ -12,7 +12,7 @@ from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.chunks import chunk_starts, chunks
 from trainer.config import RunConfig, configure
-from trainer.play import CheckpointPolicy
+from trainer.policy import NetPolicy
 from trainer.ppo import compute_gae, estimate_advantages, update
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
@@ -159,7 +159,7 @@ def test_acting_normalises_by_the_batch_and_evaluation_by_the_running_statistics
 
     by_batch = first_values(acting, image, tokens)
     assert torch.allclose(rollout.values[0], by_batch, atol=1e-5)
-    policy = CheckpointPolicy(playing, greedy=True)
+    policy = NetPolicy(playing, greedy=True)
     before = {name: value.clone() for name, value in playing.state_dict().items()}
     policy.act({"image": image, "tokens": tokens})
     assert all(torch.equal(before[name], value) for name, value in playing.state_dict().items())

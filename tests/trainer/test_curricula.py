@@ -16,8 +16,8 @@ from trainer.curricula import Leaves, Phases, build_curriculum
 from trainer.curricula.even import EvenFrames
 from trainer.curricula.progress import WINDOW, LearningProgress
 from trainer.errors import CheckpointError
-from trainer.ppo import train
 from trainer.session import Session
+from trainer.training import train
 
 SCHOOL = str(Path(__file__).parents[1] / "data" / "suites" / "school.yaml")
 INTRODUCTIONS = ("none", "eye_contact", "ask", "ask_eye_contact")

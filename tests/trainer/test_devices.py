@@ -19,7 +19,7 @@ from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
 from trainer.checkpoint import read
 from trainer.play import CheckpointPolicy
-from trainer.ppo import train
+from trainer.training import train
 
 
 @pytest.mark.parametrize("net", one_in(3, ["fast", "paper", "paper-reference"], "computes convolutions"))

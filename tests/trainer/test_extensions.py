@@ -18,9 +18,9 @@ from trainer.errors import TrainingStopped
 from trainer.guides import Lead, build_guide
 from trainer.nets import NetSpec, build_net
 from trainer.play import CheckpointPolicy
-from trainer.ppo import train
 from trainer.rollout import collect
 from trainer.session import Session
+from trainer.training import train
 
 SPEC = NetSpec((4, 2, 2, 4), (7, 7, 4), (12, 5, 3, 3), ("<pad>", "<unk>", "hello"))
 LEAVES = Leaves(("a", "b"), ({}, {}), (1, 1))

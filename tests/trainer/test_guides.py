@@ -20,9 +20,10 @@ from trainer.config import RunConfig
 from trainer.frames import Batch
 from trainer.guides import Lead, ScriptGuide
 from trainer.play import CheckpointPolicy
-from trainer.ppo import estimate_advantages, ppo_loss, train, update
+from trainer.ppo import estimate_advantages, ppo_loss, update
 from trainer.rollout import collect
 from trainer.session import Session
+from trainer.training import train
 
 
 def mixed_batch() -> tuple[Batch, torch.Tensor]:

@@ -22,13 +22,12 @@ import socialai_dsl
 from socialai_dsl.evaluation import evaluate_policy
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import ppo
-from trainer import ppo as training
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.curricula import Tutor
 from trainer.errors import CheckpointError, TrainingStopped
 from trainer.play import CheckpointPolicy
-from trainer.ppo import train
+from trainer.training import train
 
 ROOT = Path(__file__).parents[2]
 
@@ -279,7 +278,7 @@ def test_bad_environments_stop_the_run_at_once(
 def test_numbers_that_are_not_finite_stop_the_run_at_once(
     place: str, message: str, tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, calls = training.ppo_loss, 0
+    real, calls = ppo.ppo_loss, 0
 
     def poisoned(batch: Any, logits: torch.Tensor, values: torch.Tensor, *rest: Any) -> Any:
         nonlocal calls
@@ -299,11 +298,9 @@ def test_numbers_that_are_not_finite_stop_the_run_at_once(
         return progress
 
     sessions: list[Any] = []
-    start = training.Session.start
-    monkeypatch.setattr(training, "ppo_loss", poisoned)
-    monkeypatch.setattr(
-        training.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1]
-    )
+    start = ppo.Session.start
+    monkeypatch.setattr(ppo, "ppo_loss", poisoned)
+    monkeypatch.setattr(ppo.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1])
     with pytest.raises(TrainingStopped) as caught:
         train(small_config(), EchoEnvs(8), tmp_path, spoil(sessions))
     check_stopped(tmp_path, message, caught)
@@ -317,7 +314,7 @@ def test_weights_that_a_step_spoils_are_not_saved(
     config = small_config(
         net="fast" if name == "film.bias" else "paper-reference", epochs=1, checkpoint_every=1
     )
-    start, step, steps = training.Session.start, torch.optim.Adam.step, []
+    start, step, steps = ppo.Session.start, torch.optim.Adam.step, []
 
     def spoiling(optimizer: Any) -> None:
         step(optimizer)
@@ -326,9 +323,7 @@ def test_weights_that_a_step_spoils_are_not_saved(
             sessions[0].actor.net.state_dict()[name][0] = torch.inf
 
     sessions: list[Any] = []
-    monkeypatch.setattr(
-        training.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1]
-    )
+    monkeypatch.setattr(ppo.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1])
     monkeypatch.setattr(torch.optim.Adam, "step", spoiling)
     with pytest.raises(TrainingStopped) as caught:
         train(config, EchoEnvs(8), tmp_path)
@@ -338,7 +333,7 @@ def test_weights_that_a_step_spoils_are_not_saved(
 def test_figures_that_are_not_finite_stop_the_run(
     tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, calls = training.ppo_loss, 0
+    real, calls = ppo.ppo_loss, 0
 
     def diverging(*everything: Any) -> Any:
         nonlocal calls
@@ -346,7 +341,7 @@ def test_figures_that_are_not_finite_stop_the_run(
         parts = real(*everything)
         return parts._replace(approx_kl=parts.loss / 0) if calls == 12 else parts
 
-    monkeypatch.setattr(training, "ppo_loss", diverging)
+    monkeypatch.setattr(ppo, "ppo_loss", diverging)
     with pytest.raises(TrainingStopped) as caught:
         train(small_config(), EchoEnvs(8), tmp_path)
     check_stopped(tmp_path, "approx_kl of the update is not a finite number", caught)
@@ -362,7 +357,7 @@ from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
 from trainer.errors import TrainingStopped
-from trainer.ppo import train
+from trainer.training import train
 
 config = RunConfig(envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, tensorboard=False, checkpoint_every=3)
 
@@ -394,7 +389,7 @@ sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
-from trainer.ppo import train
+from trainer.training import train
 
 config = RunConfig.model_validate_json(sys.argv[1])
 run_dir = Path({str(tmp_path / "killed")!r})

@@ -10,7 +10,7 @@ import pytest
 from socialai_dsl.runs.tracking import TrackingWarning, WandbTracker
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
-from trainer.ppo import train
+from trainer.training import train
 
 CONFIG = RunConfig(
     envs=8,
