@@ -105,6 +105,6 @@ def test_the_commands_of_a_wheel_need_no_checkout(wheel: Path, tmp_path: Path) -
 
     assert "validate" in command("main", "--help")
     assert "1 file checked: 0 errors" in command("main", "validate", "talkitout")
-    assert command("main", "codes", "S101").startswith("# S101")
+    assert command("main", "explain", "S101").startswith("# S101")
     random = ["--agent", "random", "--eval-episodes", "2", "--out", "run"]
     assert "2 of the test set" in command("run_main", "cointhief", *random)

@@ -200,7 +200,8 @@ def test_every_command_that_takes_a_trained_agent_takes_it(tmp_path: Path, capsy
         printed("trace", QUICK, "--agent", "shipped", "--test-episode", "0", "--steps", "2", "--json")
     )
     assert shown["agent"] == agent
-    assert "episodes of shipped 10" in printed("coverage", QUICK, "--agent", "shipped", *few)
+    coverage = ["check", QUICK, "--part", "coverage", "--agent", "shipped"]
+    assert "episodes of shipped 10" in printed(*coverage, *few)
 
     printed("export", agent, "--out", str(tmp_path / "mine"))
     again = json.loads(printed("evaluate", str(tmp_path / "mine"), *few, "--device", "cpu", "--json"))

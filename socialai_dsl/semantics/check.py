@@ -276,7 +276,9 @@ def check_meaning(
         words = registers.words
         if registers.learned:
             continue
-        if found.has_errors or (ranges.settled(registers.ranges, registers.sources) and settled):
+        if found.has_errors or (
+            ranges.settled(registers.ranges, registers.sources, registers.copies) and settled
+        ):
             run.report_too_far(ranges.too_far)
             run.report_heard(checked is not None)
             if checked is not None:

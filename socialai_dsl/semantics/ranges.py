@@ -19,8 +19,8 @@ _MOST_NARROWINGS = 7
 class Ranges:
     """Finds, over repeated resolutions, ranges that hold whatever is set.
 
-    A register that follows from others is known when they are, which takes a round for each register on the way. One
-    that follows from itself, such as `n: n + 1`, is given what it can gain in a whole episode.
+    A register that is computed from others is known when they are, which takes a round for each register on the way.
+    One that follows from itself, such as `n: n + 1`, is given what it can gain in a whole episode.
 
     Attributes:
         now: register -> the range to resolve with.
@@ -43,12 +43,18 @@ class Ranges:
             setters += own * max(1, followed[str(path[-1])])
         self._steps = scenario.horizon * setters
 
-    def settled(self, needed: Mapping[str, Type], read: Mapping[str, set[str]]) -> bool:
+    def settled(
+        self, asked: Mapping[str, Type], read: Mapping[str, set[str]], copies: Mapping[str, set[str]]
+    ) -> bool:
         """Take note of the ranges that a resolution asked for; whether it had them already.
 
-        `read`: register -> the registers that the values it is set to follow from.
+        Args:
+            asked: register -> range.
+            read: register -> the registers that the values it is set to follow from.
+            copies: register -> those whose values it is set to as they are, which needs no other resolution.
         """
         self._rounds += 1
+        needed = _with_copies(asked, copies)
         for path, type_ in needed.items():
             if abs(type_.farthest) > LARGEST_NUMBER:
                 self.too_far.setdefault(path, type_.farthest)
@@ -109,6 +115,23 @@ def _sources(path: str, read: Mapping[str, set[str]]) -> set[str]:
         found |= new
         waiting += new
     return found
+
+
+def _with_copies(asked: Mapping[str, Type], copies: Mapping[str, set[str]]) -> dict[str, Type]:
+    """The ranges with room for all that reaches a register by copying, however many others are on the way."""
+    into: dict[str, list[str]] = {}
+    for path in asked:
+        for source in copies.get(path, ()):
+            into.setdefault(source, []).append(path)
+    needed, waiting = dict(asked), [path for path in asked if path in into]
+    while waiting:
+        source = waiting.pop()
+        for path in into.get(source, ()):
+            low, high = min(needed[path].low, needed[source].low), max(needed[path].high, needed[source].high)
+            if (low, high) != (needed[path].low, needed[path].high):
+                needed[path] = replace(needed[path], low=low, high=high)
+                waiting.append(path)
+    return needed
 
 
 def _excess(type_: Type, range_: Type | None) -> int:

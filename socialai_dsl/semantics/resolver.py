@@ -208,6 +208,7 @@ class Registers:
         learned: whether it was found only now what some register holds that starts with nothing.
         ranges: for registers that are set, the range they were found to need.
         sources: for these, the registers that the values they are set to follow from.
+        copies: for these, the registers whose values they are set to as they are.
         remembered: what is computed at the start of every step, for `prev`.
     """
 
@@ -225,6 +226,7 @@ class Registers:
         self._given_ranges = dict(ranges)
         self.ranges: dict[str, Type] = {}
         self.sources: dict[str, set[str]] = {}
+        self.copies: dict[str, set[str]] = {}
 
     def __len__(self) -> int:
         """How many registers are declared or hold a known value."""
@@ -376,6 +378,8 @@ class Registers:
         """Make room in a register for a value it is set to; one with a range of its own keeps to it."""
         declaration, type_ = self._declared[path], value.type
         self.sources.setdefault(path, set()).update(_registers_in(value))
+        if isinstance(value, Read):
+            self.copies.setdefault(path, set()).add(value.path)
         if declaration.starts_with_nothing and declaration.range is None and path not in self.words:
             self.words[path] = type_
             self.learned = True

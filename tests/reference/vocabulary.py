@@ -70,8 +70,9 @@ class Vocabulary(Words):
         yield from (filler.word for fillers in grammar.fillers.values() for filler in fillers)
         for name in self.members:
             yield from self.names_of(name)
-        for name in self.members:
+        for name in [name for name in self.members if name != "agent"]:
             # All that a member can be follows one frame: each of its lines with what any version puts in.
+            # A script of the agent says what the grammar has: with it and without, the words are the same.
             for value in self.sayings((name, 0)):
                 for who in self.who(name):
                     for piece in self.pieces(value.tree, who):

@@ -247,7 +247,7 @@ def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
         "--hyper",
         "clip_value=true",
     ]
-    assert run_main(["corridor.yaml", *QUICK, *given, "--out", "here"]) == 0
+    assert run_main(["corridor.yaml", *QUICK, "--bonus", "lang", *given, "--out", "here"]) == 0
     assert run_main(["--resume", "here", "--frames", "4000"]) == 0
     used = json.loads(Path("here", "config.json").read_text())
     assert used["frames"] == 4000
@@ -421,7 +421,8 @@ def test_parts_of_ones_own_work_from_the_scenario_s_folder(capsys: Capture) -> N
     (code,) = [
         part.partition("```")[0] for part in Path("here/model_card.md").read_text().split("```python\n")[1:]
     ]
-    exec(compile(code, "model_card.md", "exec"), {})
+    with contextlib.chdir("here"):
+        exec(compile(code, "model_card.md", "exec"), {})
     assert capsys.readouterr().out.strip() in evaluated["outcomes"]
 
 

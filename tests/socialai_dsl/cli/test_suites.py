@@ -174,6 +174,9 @@ def test_a_run_with_a_curriculum_is_resumed_with_it(capsys: Capture) -> None:
     assert json.loads(Path("run/config.json").read_text())["curriculum"] == "plan.yaml"
     assert run_main(["--resume", "run", "--frames", "3000"]) == 0
     Path("plan.yaml").write_text(plan.replace("99000", "98000"))
+    assert run_main(["--resume", "run", "--frames", "4500"]) == 0, "a run has a copy of its own"
+    (kept,) = Path("run").rglob("plan.yaml")
+    kept.write_text(plan.replace("99000", "98000"))
     assert run_main(["--resume", "run", "--frames", "6000"]) == 2
     assert "its file has changed" in capsys.readouterr().err
 

@@ -37,12 +37,12 @@ _, steps, rows, *names = sys.argv
 for name in names:
     digest = hashlib.sha256()
     envs = sd.make_vec(name, num_envs=int(rows))
-    rng = np.random.default_rng(0)
+    rng, sizes = np.random.default_rng(0), envs.single_action_space.nvec
     observation, _ = envs.reset(seed=4)
     for _ in range(int(steps)):
         for part in observation.values():
             digest.update(part.tobytes())
-        observation, reward, *_ = envs.step(rng.integers(0, envs.single_action_space.nvec, (int(rows), 4)))
+        observation, reward, *_ = envs.step(rng.integers(0, sizes, (int(rows), len(sizes))))
         digest.update(reward.tobytes())
     print(digest.hexdigest())
 """
