@@ -19,6 +19,7 @@ from trainer.errors import ObservationError
 from trainer.extensions import require_shape
 from trainer.nets import ActorCritic
 from trainer.nets.dialogue import prefix_tree
+from trainer.nets.sight import require_bounds
 
 Int64 = NDArray[np.int64]
 
@@ -65,7 +66,7 @@ class Actor:
     tables only grow, and rows in them are never changed.
 
     Attributes:
-        images: distinct images, uint8 (I, H, W, C).
+        images: distinct images as the network sees them, uint8 (I, *sight.shape).
         histories: distinct 0-padded histories as the network reads them, int16 (D, `reader.length(L)`).
         pairs: distinct (image row, history row), int64 (P, 2).
     """
@@ -74,13 +75,12 @@ class Actor:
         self.net = net
         self.device = next(net.parameters()).device
         self._length = net.reader.length(tokens_length)
-        self._image_high = np.array(net.spec.image_high)  # (C,)
         self.begin()
 
     @torch.no_grad()
     def begin(self) -> None:
         """Forget every encoding, because the weights changed."""
-        self.images = DistinctRows(self.net.spec.image_shape, np.uint8)
+        self.images = DistinctRows(self.net.sight.shape, np.uint8)
         self.histories = DistinctRows((self._length,), np.int16)
         self.pairs = DistinctRows((2,), np.int64)
         self._texts = torch.zeros(1, self.net.dialogue.size, device=self.device)  # (D, size)
@@ -93,7 +93,7 @@ class Actor:
         """Take in one observation of every environment.
 
         Args:
-            images: uint8 (E, H, W, C).
+            images: as the network's sight made them, uint8 (E, *sight.shape).
             tokens: int16 (E, L), 0-padded.
             ids: 64-bit ids of the images and of the histories, int64 (E,) each; made from the content if absent.
 
@@ -107,9 +107,7 @@ class Actor:
         if not self.net.distinct:
             image_ids = np.arange(len(images)) + len(self.images.data)  # each image is new
         image_rows, fresh = self.images.add(image_ids, images)
-        if (images[fresh] > self._image_high).any():
-            high = tuple(self.net.spec.image_high)
-            raise ObservationError(f"image: a cell exceeds the bounds {high} of its channels")
+        require_bounds(images[fresh], self.net.sight.high)
         history_rows = self._hear(history_ids, tokens)
         pairs = np.stack((image_rows, history_rows), 1)
         rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)

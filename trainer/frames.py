@@ -59,7 +59,7 @@ class Stretches:
     """T steps each of B environments, with their distinct frames prepared once; N = T * B frames, time-major.
 
     Attributes:
-        starts: bool (T, B), whether an episode starts with the step. memory: (B, *shape) before the first step.
+        starts: bool (T, B), whether an episode starts with the step. memory: (B, ...) before the first step.
         images: uint8 (I, H, W, C), distinct ones. histories: int16 (D, L), distinct ones, as the network reads them.
         prepared: the net's view of the images. tree: of the histories.
         image_index, history_index: int64 (P,), image and history of each distinct pair.
@@ -92,7 +92,7 @@ class Stretches:
         Args:
             net: the network.
             starts: bool (T, B).
-            memory: (B, *shape).
+            memory: (B, ...).
             images: uint8 (I, H, W, C).
             histories: int16 (D, L), as the network reads them.
             pairs: int64 (P, 2), distinct ones: rows of `images` and of `histories`.
@@ -126,7 +126,7 @@ class Stretches:
             images: uint8 (T, B, H, W, C).
             tokens: int16 (T, B, L), as the network reads them; see `seen`.
             starts: bool (T, B), on the network's device.
-            memory: (B, *shape) before the first step, on the same.
+            memory: (B, ...) before the first step, on the same.
         """
         pictures, lines = (array.flatten(0, 1).cpu().numpy() for array in (images, tokens))
         ids = content_ids(pictures) if net.distinct else np.arange(len(pictures))

@@ -33,6 +33,7 @@ class NetPolicy:
         self._streams = Streams(seed)
         self._actor: Actor | None = None
         self._memory = net.memory.initial(1)
+        self._seen = np.zeros((1, net.sight.size), np.int64)
         self._last: tuple[torch.Tensor, torch.Tensor] | None = None
 
     def reset(self, mask: NDArray[np.bool_] | None = None, episodes: Int64 | None = None) -> None:
@@ -41,6 +42,7 @@ class NetPolicy:
             mask = np.ones(len(self._memory), np.bool_)
         self._require(len(mask))
         self._memory = emptied(self._memory, torch.from_numpy(mask).to(self._memory.device))
+        self._seen[mask] = 0
         self._streams.begin(mask, episodes)
 
     @torch.no_grad()
@@ -77,6 +79,7 @@ class NetPolicy:
         self._require(len(tokens))
         if self._actor is None or len(self._actor.pairs.data) > _REMEMBERED_FRAMES:
             self._actor = Actor(self.net, tokens.shape[1])
+        images, self._seen = self.net.sight.look(images, self._seen)
         _, features = self._actor.see(images, tokens)
         output, self._memory = self.net.memory.step(features, self._memory)
         self._last = self.net.heads(output)
@@ -86,3 +89,4 @@ class NetPolicy:
         """Begin with an empty memory if another number of environments is played now."""
         if len(self._memory) != count:
             self._memory, self._actor = self.net.memory.initial(count), None
+            self._seen = np.zeros((count, self.net.sight.size), np.int64)

@@ -14,7 +14,7 @@ from trainer import actions as heads
 from trainer.bonus import BatchStep
 from trainer.errors import require_finite
 from trainer.extensions import require_array, require_shape
-from trainer.features import Actor, Int64
+from trainer.features import Actor, Int64, content_ids
 from trainer.guides import Guide, Lead
 from trainer.logging import Tally
 from trainer.nets.memory import emptied
@@ -64,14 +64,14 @@ def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) 
         ObservationError: an observation is outside its bounds.
         TrainingStopped: a reward or an output of the network is not finite.
     """
-    actor, envs, state, config = session.actor, session.envs, session.state, session.config
+    actor, state, config = session.actor, session.state, session.config
     net, sizes, tally = actor.net, actor.net.spec.action_sizes, Tally()
     shape = (config.horizon, config.envs, sum(sizes))
     noise = heads.gumbel_noise(shape, session.generator).to(actor.device)  # (T, E, A)
     steps, memories, leads = [], [], []
     actor.begin()
     for t in range(config.horizon):
-        rows, features = actor.see(state.image, state.tokens, _ids(envs))  # (E,), (E, F)
+        rows, features = actor.see(state.image, state.tokens, _ids(session))  # (E,), (E, F)
         starts = actor.move(state.starts)  # (E,)
         memory = emptied(state.memory, starts)  # (E, *shape)
         if t % (config.bptt or config.horizon) == 0:
@@ -87,7 +87,7 @@ def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) 
             leads.append(given)
         reward, ended, bootstrap = map(actor.move, _step(session, actions, tally))  # (E,) each
         steps.append((actions, values, reward, starts, ended, bootstrap, torch.from_numpy(rows), logits))
-    next_value = _value(actor, emptied(state.memory, ended), state.image, state.tokens, _ids(envs))
+    next_value = _value(actor, emptied(state.memory, ended), state.image, state.tokens, _ids(session))
     *columns, logits = (torch.stack(column) for column in zip(*steps, strict=True))
     log_probs, _ = heads.log_probs_and_entropies(logits, columns[0], sizes)
     lead = None
@@ -100,8 +100,11 @@ def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) 
     return rollout
 
 
-def _ids(envs: Any) -> tuple[Int64, Int64]:
-    return envs.image_ids(), envs.history_ids()
+def _ids(session: Session) -> tuple[Int64, Int64]:
+    """Ids of the current images, as the network sees them, and histories, int64 (E,) each."""
+    envs, state = session.envs, session.state
+    images = content_ids(state.image) if state.seen.size else envs.image_ids()
+    return images, envs.history_ids()
 
 
 def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[Tensor, Lead]:
@@ -160,9 +163,12 @@ def _step(
     bootstrap = np.zeros(len(ended), np.float32)
     if config.bootstrap_timeouts and cut.any():
         final, probe = infos["final_obs"], Actor(session.actor.net, state.tokens.shape[1])
-        values = _value(probe, state.memory[probe.move(cut)], final["image"][cut], final["tokens"][cut])
+        image, _ = probe.net.sight.look(final["image"][cut], state.seen[cut])
+        values = _value(probe, state.memory[probe.move(cut)], image, final["tokens"][cut])
         bootstrap[cut] = values.cpu().numpy()
-    state.image, state.tokens, state.starts = observation["image"].copy(), observation["tokens"].copy(), ended
+    state.seen[ended] = 0
+    state.image, state.seen = session.actor.net.sight.look(observation["image"].copy(), state.seen)
+    state.tokens, state.starts = observation["tokens"].copy(), ended
     state.returns += reward
     state.lengths += 1
     if session.tutor is not None:

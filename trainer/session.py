@@ -52,9 +52,10 @@ class State:
     """The environments as the agent last met them: what one rollout hands to the next.
 
     Attributes:
-        image: uint8 (E, H, W, C), tokens: int16 (E, L): the current observation.
+        image: uint8 (E, *sight.shape), tokens: int16 (E, L): the current observation, the image as the net sees it.
         starts: bool (E,), whether the current observation begins an episode.
         memory: float32 (E, *shape), before the current observation.
+        seen: int64 (E, sight.size), what the network's sight keeps of the running episodes.
         returns: float64 (E,), lengths: int64 (E,) of the running episodes.
         led: bool (E,), whether a guide took part in the running episode.
     """
@@ -63,6 +64,7 @@ class State:
     tokens: NDArray[np.int16]
     starts: NDArray[np.bool_]
     memory: Tensor
+    seen: Int64
     returns: NDArray[np.float64]
     lengths: Int64
     led: NDArray[np.bool_]
@@ -134,11 +136,14 @@ class Session:
         guide = build_guide(config, envs)
         if tutor is not None:
             tutor.begin()
+        seen = np.zeros((config.envs, net.sight.size), np.int64)
+        image, seen = net.sight.look(observation["image"].copy(), seen)
         state = State(
-            image=observation["image"].copy(),
+            image=image,
             tokens=observation["tokens"].copy(),
             starts=np.ones(config.envs, np.bool_),
             memory=net.memory.initial(config.envs),
+            seen=seen,
             returns=np.zeros(config.envs),
             lengths=np.zeros(config.envs, np.int64),
             led=np.zeros(config.envs, np.bool_),
@@ -270,6 +275,8 @@ class Session:
             self.optimizer.state[parameter] = dict(zip(_ADAM, (step, *like), strict=True))
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
+        if not self.state.seen.size:
+            stored.setdefault("seen", torch.from_numpy(self.state.seen))  # runs of before have nothing there
         for name, present in vars(self.state).items():
             value = fitting(stored, name, torch.as_tensor(present))
             is_tensor = isinstance(present, Tensor)

@@ -260,7 +260,7 @@ def played(config: RunConfig) -> tuple[Session, Any]:
 
 
 @pytest.mark.parametrize("bptt", [0, 4])
-@pytest.mark.parametrize("net", ["fast", "paper"])
+@pytest.mark.parametrize("net", ["fast", "paper", "relations"])
 def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config: Any) -> None:
     """Before the first step the minibatch gives the log-probabilities and values recorded while acting."""
     config = small_config(net=net, bptt=bptt)
@@ -306,7 +306,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     assert chosen.mean().item() > before
 
 
-@pytest.mark.parametrize("net", ["fast", "paper"])
+@pytest.mark.parametrize("net", ["fast", "paper", "relations"])
 def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -> None:
     """The same step by PyTorch's plain means: backward, clip, unfused Adam."""
     config = small_config(net=net, minibatches=1, epochs=1, max_grad_norm=0.01)

@@ -69,7 +69,7 @@ def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
     )
 
 
-@pytest.mark.parametrize("net", ["fast", "paper"])
+@pytest.mark.parametrize("net", ["fast", "paper", "relations"])
 @pytest.mark.parametrize("length", one_in(2, [8, 40], "computes convolutions"))
 def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, small_config: Any) -> None:
     """No sharing, no streaming: one frame at a time, histories from the first word, memory emptied at starts."""
@@ -77,8 +77,11 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
     session, rollout = play(small_config(net=net, horizon=24), envs)
     model = session.actor.net
     memory = model.memory.initial(8)
+    seen = np.zeros((8, model.sight.size), np.int64)
     with torch.no_grad():
         for t in range(24):
+            seen[rollout.starts[t].numpy()] = 0
+            envs.seen[t]["image"], seen = model.sight.look(envs.seen[t]["image"], seen)
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
             memory = emptied(memory, rollout.starts[t])
             output, memory = model.memory.step(features, memory)

@@ -11,11 +11,13 @@ from trainer.nets.base import ActorCritic, NetSpec, Precision
 from trainer.nets.fast import FastNet
 from trainer.nets.memory import Memory
 from trainer.nets.paper import PaperNet, PaperReferenceNet
+from trainer.nets.relations import RelationsNet
 
-__all__ = ["ActorCritic", "FastNet", "Memory", "NetSpec", "build_net", "net_class"]
+__all__ = ["ActorCritic", "FastNet", "Memory", "NetSpec", "RelationsNet", "build_net", "net_class"]
 
 _SHIPPED: dict[str, type[ActorCritic]] = {
     "fast": FastNet,
+    "relations": RelationsNet,
     "paper": PaperNet,
     "paper-reference": PaperReferenceNet,
     "paper-reference-tuned": PaperReferenceNet,

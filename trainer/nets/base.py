@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from trainer.nets.dialogue import DialogueEncoder
 from trainer.nets.memory import LstmMemory, Memory
 from trainer.nets.reading import Reader
+from trainer.nets.sight import Sight
 
 Precision = Literal["float32", "bfloat16"]
 
@@ -133,6 +134,7 @@ class ActorCritic(nn.Module, ABC):
         word_rows: the parameters with one row for each word; an agent that plays with another vocabulary keeps the rows
             of the words that both have.
         reader_class: how histories are read before they are encoded; `reader` is one for the scenario's words.
+        sight_class: how images are seen before anything is computed; `sight` is one for the scenario's images.
     """
 
     distinct = True
@@ -141,6 +143,7 @@ class ActorCritic(nn.Module, ABC):
     precision: Precision = "float32"
     word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
     reader_class: type[Reader] = Reader
+    sight_class: type[Sight] = Sight
 
     def __init__(
         self, spec: NetSpec, features: int, dialogue: DialogueEncoder, memory_size: int = 128
@@ -148,6 +151,7 @@ class ActorCritic(nn.Module, ABC):
         super().__init__()
         self.spec = spec
         self.reader = self.reader_class(spec.vocabulary)
+        self.sight = self.sight_class(spec.image_shape, spec.image_high)
         self.features = features
         self.dialogue = dialogue
         self.memory: Memory = LstmMemory(features, memory_size)
@@ -155,7 +159,10 @@ class ActorCritic(nn.Module, ABC):
 
     @abstractmethod
     def prepare(self, images: Tensor) -> Any:
-        """The part of the work on images, uint8 (I, H, W, C), that uses no weights; `perceive` gets the result."""
+        """The part of the work on images, uint8 (I, H, W, C) as `sight` made them, that uses no weights.
+
+        `perceive` gets the result.
+        """
 
     @abstractmethod
     def perceive(self, prepared: Any, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:

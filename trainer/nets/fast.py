@@ -46,14 +46,14 @@ class FastNet(ActorCritic):
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
         super().__init__(spec, width, HeardWords(spec.vocabulary_size))
-        height, ahead, channels = spec.image_shape
+        height, ahead, channels = self.sight.shape
         # 256 values per channel, so that scenarios with other bounds share the weights' shape.
         self.channels = nn.Parameter(torch.randn(channels, 256, self.kind_size) * channels**-0.5)
         self.mentions = nn.Parameter(torch.zeros(spec.vocabulary_size, channels, 256))
         self.film = nn.Linear(self.dialogue.hidden, 2 * self.kind_size)
         self.cells = nn.Linear(height * ahead * self.kind_size, width)
         self.words = nn.Linear(self.dialogue.hidden, width, bias=False)
-        self._sizes = tuple(high + 1 for high in spec.image_high)
+        self._sizes = tuple(high + 1 for high in self.sight.high)
 
     def prepare(self, images: Tensor) -> Cells:
         """The kinds of the images' cells."""
