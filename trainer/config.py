@@ -254,9 +254,8 @@ class RunConfig(_Options):
         def now(start: float, end: float) -> float:
             return start + (end - start) * update / self.updates
 
-        return self.model_copy(
-            update={name: now(getattr(self, name), end) for name, end in self.ends.items()}
-        )
+        values = {name: now(getattr(self, name), end) for name, end in self.ends.items()}
+        return self.model_copy(update=values) if values else self
 
     @property
     def depends_on_frames(self) -> bool:

@@ -220,10 +220,9 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     minibatch without any ends nothing.
 
     Returns:
-        `STATISTICS` by name, means over the minibatches, None where they have no frame of that kind, and with an
-        auxiliary loss `aux_loss`; the mean norm of
-        the gradient before clipping; the share of the value's variance that the critic explained, in all frames; and
-        the learning rate.
+        `STATISTICS` by name, means over the minibatches, None where they have no frame of that kind; with an auxiliary
+        loss `aux_loss`; the mean norm of the gradient before clipping; the share of the value's variance that the
+        critic explained, in all frames; and the learning rate.
 
     Raises:
         TrainingStopped: a loss, a gradient or a weight is not finite.

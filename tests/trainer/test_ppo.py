@@ -374,6 +374,20 @@ def test_steps_get_longer_again_up_to_the_schedule(small_config: Any) -> None:
     assert rates == pytest.approx([0.7e-3, 0.875e-3, 1e-3])
 
 
+@pytest.mark.parametrize("net", ["fast", "paper", "relations"])
+def test_threads_can_share_a_network(net: str, small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pass over a minibatch sets no attribute of the network or its parts, which another thread would meet."""
+    config = small_config(net=net)
+    session, rollout = played(config)
+    minibatch = cut_out(session, rollout, estimate_advantages(config, rollout), torch.arange(config.envs))
+
+    def refuse(module: torch.nn.Module, name: str, value: object) -> None:
+        raise AssertionError(f"{type(module).__name__}.{name} was set")
+
+    monkeypatch.setattr(torch.nn.Module, "__setattr__", refuse)
+    assert len(list(minibatch.evaluate(session.actor.net))) == 1
+
+
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("trainer.nets.ActorCritic.smallest_share", 1)
     nets = []

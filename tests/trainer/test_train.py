@@ -70,7 +70,7 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     [
         ("fast", "lang", 1, "environments"),
         ("fast", "cell", 2, "environments"),
-        ("relations", "none", 1, "environments"),
+        ("relations", "none", 2, "environments"),
         ("paper-reference", "none", 1, "chunks"),
     ],
 )

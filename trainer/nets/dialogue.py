@@ -153,7 +153,7 @@ class HeardWords(DialogueEncoder):
     def forward(self, tree: PrefixTree) -> Tensor:
         """See `DialogueEncoder.forward`."""
         states = super().forward(tree)
-        heard = states.new_zeros(len(states), self.size - self.hidden)
+        heard = states.new_zeros(len(states), self.embedding.num_embeddings)
         # Level by level: a history has the words of its parent, and one more.
         for first, behind in pairwise(tree.offsets):
             words = heard.index_select(0, tree.parents[first:behind])

@@ -17,15 +17,16 @@ from trainer.nets.sight import MapSight, Sight
 class HeardLines(HeardWords):
     """The encoding of `HeardWords`, then sums over the words in their order, then who said what.
 
-    Every word adds a product of its own embedding with that of the word before it, and one with that of its place. So a
-    history is a point that depends on the order of its words, and the gradient reaches each of them from the first step
-    on, however much was said since.
+    Every word adds the product of its own embedding with that of the word before it, and one with that of its place. So
+    the sum depends on the order of the words, and the gradient reaches each word from the first update on, however much
+    was said since.
 
-    Where tokens mark speakers, the encoding has for each speaker the words that he or she said, and whether somebody
-    else has named him or her.
+    Where tokens mark speakers, the encoding also has the words of each speaker, and whether another has named them.
 
     Attributes:
-        speakers: token id of the mark -> number of the speaker.
+        speakers: how many there are, by the marks in the vocabulary.
+        speaker_of: int64 (V,), the speaker that a token marks. named: int64 (V,), the speaker whose name ends with the
+            word. Both -1 for none.
     """
 
     PLACES = 64
@@ -37,6 +38,7 @@ class HeardLines(HeardWords):
         self.pairs = nn.Parameter(torch.randn(words, 2, order) * 0.6)  # as the word before, and as the word
         self.placed = nn.Parameter(torch.randn(words, order) * 0.6)
         self.places = nn.Parameter(torch.randn(self.PLACES, order) * 0.6)
+        # No word of a text begins so; the first two ids are padding and the unknown word.
         marks = [number for number, word in enumerate(vocabulary) if number > 1 and word[:1] == "<"]
         ids = {word: number for number, word in enumerate(vocabulary)}
         self.speakers = len(marks)
@@ -61,12 +63,8 @@ class HeardLines(HeardWords):
 
     def forward(self, tree: PrefixTree) -> Tensor:
         """See `DialogueEncoder.forward`."""
-        size, self.size = self.size, self.hidden + self._widths[1]
         base = super().forward(tree)
-        self.size = size
-        words = torch.cat(
-            (tree.tokens.new_zeros(1), tree.tokens)
-        )  # of each state; the empty history has none
+        words = torch.cat((tree.tokens.new_zeros(1), tree.tokens))  # the last of each state
         before = self.pairs[words[tree.parents], 0] * (tree.parents > 0)[:, None]
         depth = torch.repeat_interleave(torch.diff(torch.tensor(tree.offsets, device=words.device)))
         added = before * self.pairs[tree.tokens, 1]
@@ -170,9 +168,8 @@ class RelationsNet(FastNet):
         kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
         mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2) * (1 + gates[:, :1])  # (S, C)
         scale, shift = self.film(state)[:, None].chunk(2, 2)
-        read = torch.relu(
-            torch.addcmul(kinds + shift, kinds, scale + mentioned[:, :, None])
-        )  # (S, C, kind_size)
+        scale = scale + mentioned[:, :, None]  # (S, C, kind_size)
+        read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))
         kind_of = prepared.kind_of.index_select(0, image_index)  # (P, cells)
         rows = (history[:, None] * len(kinds) + kind_of).flatten()
         cells = read.flatten(0, 1).index_select(0, rows).view(len(kind_of), -1)
@@ -182,9 +179,8 @@ class RelationsNet(FastNet):
         thought = self.think(torch.cat((first, past), 1))  # (P, width)
         scale, shift, weights = self.gate(thought).split((self.kind_size, self.kind_size, self.GATES), 1)
         weights = torch.tanh(weights + gates[history, 1:])  # (P, GATES)
-        again = torch.einsum(
-            "sv,vcg->scg", heard, self.again[:, channel, prepared.kinds].sum(2)
-        )  # (S, C, GATES)
+        named_again = self.again[:, channel, prepared.kinds].sum(2)  # (V, C, GATES)
+        again = torch.einsum("sv,vcg->scg", heard, named_again)  # (S, C, GATES)
         found = again.flatten(0, 1).index_select(0, rows).view(*kind_of.shape, -1)  # (P, cells, GATES)
         looked_for = (found * weights[:, None]).sum(2, keepdim=True)
         seen = kinds.index_select(0, kind_of.flatten()).view(*kind_of.shape, -1)

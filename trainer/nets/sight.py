@@ -36,11 +36,10 @@ class Sight:
 class MapSight(Sight):
     """Draws what it sees on a map, and tells for each thing in view how many others on the map are alike.
 
-    The map turns and moves with the agent: its own motion is the one under which the last view fits the new one best.
-    What is out of view stays on it as it was. Two relations need no map of their own: things of one type that are alike
-    in colour, a look, or two of these; and things alike in colour, whatever they are. Each is a channel more, with
-    the number of others: 0, 1, or 2 for more. Equality of two things in different places is a parity to a network,
-    which no single cell predicts; counted, it is one of the cell's properties.
+    The agent's motion in a step is taken to be the one under which the view fits the map best; walls stop it. What is
+    out of view stays on the map as it was. Things are alike if they share the colour, or the type and colour, a look,
+    or two of these. Each such relation is one more channel, with the number of others: 0, 1, or 2 for more. Equality of
+    two things is a parity, which no single cell predicts; counted, it is a property of the cell.
 
     Attributes:
         relations: for each further channel, the channels that things have to share.
