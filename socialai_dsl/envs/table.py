@@ -488,7 +488,7 @@ class Table(Copied):
         return HeardLines(speakers, lines)
 
     def _spoken(self) -> Iterator[tuple[int, int, NDArray[np.int64], NDArray[np.int32]]]:
-        """What was heard in the last step: a program, the how-manieth line, the rows that heard one, its numbers."""
+        """The lines heard in the last step: program, position, the rows with a line there, its number in each row."""
         registers, played = self.state.registers, self.batch.program_numbers()
         heard = registers[:, Register.HEARD]
         for number, program in enumerate(self.programs):

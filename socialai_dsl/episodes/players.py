@@ -236,8 +236,8 @@ def folder_of(agent: str) -> Path:
 def named_agent(agent: str, scenario: str) -> str:
     """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
 
-    A variant is played by the agent of what it is a variant of, unless it has one of its own. A folder may stand for
-    somebody else, see `played_again`.
+    A variant is played by the agent of what it is a variant of, unless it has one of its own. A folder names the agent
+    that played there, see `played_again`.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -258,7 +258,7 @@ def named_agent(agent: str, scenario: str) -> str:
 
 
 def played_again(agent: str) -> str:
-    """Who plays where an agent is named: the folder of a run or an evaluation stands for whoever played there.
+    """The agent that a name or a path means; the folder of a run or an evaluation means the agent that played there.
 
     Raises:
         UsageError: a person or a language model played there, or an agent that is not here.

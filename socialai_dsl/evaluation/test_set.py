@@ -286,7 +286,7 @@ def trace_test_episodes(
 def _seated(
     player: Player, scenario: str, loaded: Loaded, program: Playable, sessions: int
 ) -> Iterator[tuple[Any, Policy, list[str]]]:
-    """Rooms for so many sessions, as far as it is fast, who plays in them, and what is to be known about that.
+    """A vector environment for this number of sessions, at most `_TOGETHER` at once, the policy, and its warnings.
 
     Raises:
         UsageError: the player does not fit the scenario, now or in the block.
