@@ -6,7 +6,7 @@ so an entity, a line, a status or a coordinate that could be out of range is fou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import pairwise, product
@@ -156,6 +156,14 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         labels=dict(code.labels),
         looks=tuple((look.name, look.words) for look in shown),
         names_shown=checked.names_shown,
+        tones=_tones(checked.entities),
+    )
+
+
+def _tones(entities: Iterable[Entity]) -> tuple[str, ...]:
+    """The words of all tones, each once."""
+    return tuple(
+        dict.fromkeys(word for one in entities if one.tone is not None for word in one.tone.type.words)
     )
 
 

@@ -52,6 +52,10 @@ def hearing(programs: Collection[Program]) -> str:
         told.append("You hear yourself as well.")
     if all(program.names_shown for program in programs):
         told.append("A line begins with the name of who says it; names are not seen.")
+    tones = dict.fromkeys(tone for program in programs for tone in program.tones)
+    if tones:
+        words = ", ".join(f"({tone})" for tone in tones)
+        told.append(f"A word in brackets before a line is the tone in which it is said: {words}.")
     return " ".join(told)
 
 

@@ -95,7 +95,7 @@ class TextView:
         ValueError: there is no such style.
     """
 
-    version: ClassVar[int] = 2
+    version: ClassVar[int] = 3
 
     def __init__(self, program: Playable, style: Style = "prose", colour: bool = False) -> None:
         if style not in get_args(Style):

@@ -126,6 +126,7 @@ class Program:
         labels: heading of the block that starts at a pc.
         looks: name and words of each look that the picture shows.
         names_shown: whether a line begins with the name of who says it.
+        tones: words of the look that is heard before a line, in brackets.
     """
 
     words: npt.NDArray[np.int32]
@@ -143,6 +144,7 @@ class Program:
     labels: Mapping[int, str] = field(repr=False)
     looks: tuple[tuple[str, tuple[str, ...]], ...] = ()
     names_shown: bool = True
+    tones: tuple[str, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: nothing changes it."""

@@ -90,6 +90,10 @@ def test_what_is_heard_is_told_word_for_word(name: str) -> None:
         ("talkitout", "You and others hear each other when you are next to each other."),
         ("school/boxes+pointing", "You and others hear each other when you are anywhere in the room."),
         ("social_env", "You hear others who are anywhere in the room, some only next to you."),
+        (
+            "novel/sarcasm",
+            "A word in brackets before a line is the tone in which it is said: (calm), (laughing).",
+        ),
         ("novel/gaze_following", "A line begins with the name of who says it"),
         (
             "talkitout",
