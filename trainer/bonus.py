@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.config import RunConfig
+from socialai_dsl.vocabulary import words
+from trainer.config import BONUS_SCALES, RunConfig
 from trainer.extensions import load_class
 from trainer.features import Int64
 
-SHIPPED = ("none", "lang", "cell")
+SHIPPED = ("none", *BONUS_SCALES)
 
 _CODED_FRAMES = 40
+_AGENT = 0  # the number of the agent among speakers
 _SILENCE = 0  # what the environments' `utterance_ids` say when nothing was heard
 
 
@@ -129,6 +132,61 @@ class EpisodicBonus:
         self.keys = {key: column for column, key in enumerate(keys.tolist())}
 
 
+class LineBonus:
+    """A bonus of `bonus_c` for every line that is new in the running episode.
+
+    A line is new unless the same speaker has said it, or one that differs from it in a single word: a liar who names
+    another door each time is paid for once. What the agent says itself, and what is heard as an episode ends, pays
+    nothing.
+
+    Attributes:
+        heard: for each environment, each speaker's lines, as `heard_lines` numbers them.
+    """
+
+    def __init__(self, config: RunConfig, num_envs: int) -> None:
+        self.heard: list[dict[int, set[int]]] = [{} for _ in range(num_envs)]
+        self._words: list[list[str]] = []
+        self._alike = lru_cache(None)(self._differ_in_a_word_at_most)
+
+    def step(self, step: BatchStep) -> NDArray[np.float64]:
+        """See `Bonus.step`."""
+        self._words = self._words or [words(line) for line in step.envs.lines]
+        speakers, lines = step.envs.heard_lines()
+        paid = np.zeros(len(step.ended))
+        for env in np.flatnonzero(step.ended).tolist():
+            self.heard[env] = {}
+        for env, place in np.argwhere((speakers > _AGENT) & ~step.ended[:, None]).tolist():
+            line = int(lines[env, place])
+            known = self.heard[env].setdefault(int(speakers[env, place]), set())
+            if not any(self._alike(line, other) for other in known):
+                paid[env] += step.config.bonus_c
+            known.add(line)
+        return paid
+
+    def _differ_in_a_word_at_most(self, line: int, other: int) -> bool:
+        one, two = self._words[line], self._words[other]
+        return len(one) == len(two) and sum(a != b for a, b in zip(one, two, strict=True)) <= 1
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """See `Bonus.state`."""
+        rows = [
+            (env, speaker, line)
+            for env, known in enumerate(self.heard)
+            for speaker, lines in known.items()
+            for line in sorted(lines)
+        ]
+        return {"heard": np.array(rows, np.int64).reshape(-1, 3)}
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """See `Bonus.load_state`; a ValueError if it is of more environments."""
+        rows = state["heard"].tolist()
+        if any(env >= len(self.heard) for env, _, _ in rows):
+            raise ValueError(f"bonus: got lines of more than {len(self.heard)} environments")
+        self.heard = [{} for _ in self.heard]
+        for env, speaker, line in rows:
+            self.heard[env].setdefault(speaker, set()).add(line)
+
+
 def cell_codes(image: NDArray[np.uint8]) -> Int64:
     """One integer per cell, int64 (E, H * W), equal where all channels are."""
     cells = image.reshape(len(image), -1, image.shape[-1]).astype(np.int64)
@@ -142,8 +200,9 @@ def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
     """The bonus that a configuration names, None for `none`. Raises ValueError if it is not there or lacks a method."""
     if config.bonus == "none":
         return None
-    shipped = config.bonus in SHIPPED
-    found = (
-        EpisodicBonus if shipped else load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
-    )
-    return found(config, num_envs)
+    if config.bonus == "lines":
+        return LineBonus(config, num_envs)
+    if config.bonus in SHIPPED:
+        return EpisodicBonus(config, num_envs)
+    own: type[Bonus] = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
+    return own(config, num_envs)

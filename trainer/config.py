@@ -48,6 +48,8 @@ Name = Annotated[str, Field(min_length=1)]
 MOST_FRAMES: Final = 10**15 - 1
 """Names of checkpoints have fifteen digits."""
 _MOST_IN_UPDATE: Final = 2**24
+BONUS_SCALES: Final = {"lang": 7.0, "cell": 3.0, "lines": 0.1}
+"""The bonuses that ship, and what their scale C is where the paper says nothing of the scenario."""
 
 
 class _Starts(BaseModel):
@@ -75,8 +77,8 @@ class _Starts(BaseModel):
     precision: Literal["float32", "bfloat16"] = _flag("float32", "numbers of the convolutions of `paper`")
     bonus: Name = _flag(
         "none",
-        "exploration bonus: none, lang (new utterances), cell (new kinds of cells) or mine:Bonus; the command line "
-        "takes auto as well, the paper's choice for the scenario",
+        "exploration bonus: none, lang (new utterances), cell (new kinds of cells), lines (new lines of a speaker) or "
+        "mine:Bonus; the command line takes auto as well, the paper's choice for the scenario",
     )
     curriculum: Name = _flag(
         "none",
@@ -127,7 +129,9 @@ class _Starts(BaseModel):
     )
     bootstrap_timeouts: bool = _option(False, "go on with the value after a time-out (paper: terminal)")
     bonus_c: float = _coefficient(
-        7.0, "C of the bonus (default: the paper's for the scenario, else 7 for lang and 3 for cell)", ge=0
+        7.0,
+        "C of the bonus (default: the paper's for the scenario, else 7 for lang, 3 for cell and 0.1 for lines)",
+        ge=0,
     )
     bonus_m: float = _option(50.0, "M of the bonus: 50 pays first visits only (paper)", ge=0)
     bonus_t: float = _option(0.6, "T of the bonus, as coded its upper bound per step (paper)", gt=0)

@@ -16,6 +16,7 @@ from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
 from socialai_dsl.source import DataPath
+from trainer.config import BONUS_SCALES
 from trainer.shipped import PREFIX, shipped_agents
 
 
@@ -143,7 +144,7 @@ def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: Diagnostic
         bag.error("S703", message, resolved.tree.value_span(cell.places["agent"]), suggestion=near, hint=hint)
 
 
-_NAMES: Final = {"net": NETS, "bonus": ("none", "auto", "lang", "cell"), "guide": ("none", "script")}
+_NAMES: Final = {"net": NETS, "bonus": ("none", "auto", *BONUS_SCALES), "guide": ("none", "script")}
 """Options that name something shipped, or a class of the user's as `mine:Class`."""
 
 

@@ -15,7 +15,7 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.runs.options import resolved_config, usual_options
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
-from trainer.config import WITHOUT_EFFECT, RunConfig
+from trainer.config import BONUS_SCALES, WITHOUT_EFFECT, RunConfig
 from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.shipped import PREFIX, located
 
@@ -131,7 +131,7 @@ def options_of(cell: Cell) -> dict[str, Any]:
         ("net", "envs", "bonus", "device", "threads", "checkpoint_every", "eval_episodes", *asked)
     )
     hyper = dict(cell.options.get("hyper", {}))
-    if config["bonus"] in ("lang", "cell"):
+    if config["bonus"] in BONUS_SCALES:
         hyper["bonus_c"] = config["bonus_c"]
     return {
         "recipe": config["recipe"],

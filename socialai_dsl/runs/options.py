@@ -15,7 +15,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import OptionError, first_mistake
 from socialai_dsl.frontend import closest_script, load_curriculum
-from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, UNTRAINED, RunConfig, configure
+from trainer.config import BONUS_SCALES, FLAGS, HYPER, NET_PRESETS, RECIPES, UNTRAINED, RunConfig, configure
 
 AUTOMATIC: Final[Mapping[str, str]] = {
     "device": "a graphics card where there is one",
@@ -46,7 +46,6 @@ _MOST_THREADS: Final = 4
 _PLAIN_FRAMES: Final = 600_000
 _GUIDED_FRAMES: Final = 1_000_000
 _GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
-_BONUS_C: Final = {"lang": 7.0, "cell": 3.0}
 _PAPER_BONUS: Final = Path(__file__).with_name("paper_bonus.yaml")
 
 
@@ -177,9 +176,9 @@ def _resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:
     listed = table.get(name, {"kind": "none"})
     if kind == "auto":
         kind = listed["kind"]
-    if kind not in _BONUS_C:
+    if kind not in BONUS_SCALES:
         return {"bonus": kind}
-    scale = listed["c"] if kind == listed["kind"] else _BONUS_C[kind]
+    scale = listed["c"] if kind == listed["kind"] else BONUS_SCALES[kind]
     return {"bonus": kind, "bonus_c": float(scale)}
 
 
@@ -207,6 +206,8 @@ def _refuse_idle(given: Iterable[str], config: RunConfig) -> None:
         for part, options in _OF_PART.items():
             if name.removesuffix("_end") in options and getattr(config, part) == "none":
                 raise OptionError(name, f"it is for --{part}, and this run has none")
+        if config.bonus == "lines" and name in _OF_PART["bonus"][1:]:
+            raise OptionError(name, "it is for the paper's bonuses, lang and cell")
 
 
 def _refuse_training_options(options: Mapping[str, Any]) -> None:

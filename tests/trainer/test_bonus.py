@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.bonus import BatchStep, EpisodicBonus, cell_codes
+from socialai_dsl.envs.table import HeardLines
+from trainer.bonus import BatchStep, EpisodicBonus, LineBonus, cell_codes
 from trainer.config import RunConfig
 
 IMAGE = np.zeros((2, 7, 7, 4), np.uint8)
@@ -157,6 +158,55 @@ def test_a_saved_bonus_continues_exactly() -> None:
     other.load_state(half.state())
     for ids, ends in steps[20:]:
         assert (whole.pay(hears(*ids), IMAGE, ends) == other.pay(hears(*ids), IMAGE, ends)).all()
+
+
+LINES = ("I am fine.", "Take the red door.", "Take the blue door.", "Yes.", "No.", "Take the blue coin now.")
+
+
+def pay_for_lines(
+    bonus: LineBonus, said: list[list[tuple[int, int]]], ends: np.ndarray, scale: float = 0.1
+) -> list[float]:
+    """What each environment is paid, where (speaker, line) pairs are heard."""
+    most = max(map(len, said))
+    padded = np.array([[*pairs, *[(-1, -1)] * (most - len(pairs))] for pairs in said], np.int64)
+    heard = HeardLines(*np.moveaxis(padded.reshape(len(said), most, 2), 2, 0))
+    envs = SimpleNamespace(heard_lines=lambda: heard, lines=LINES)
+    config, zeros = RunConfig(bonus="lines", bonus_c=scale), np.zeros(len(said))
+    actions = np.zeros((len(said), 4), np.int64)
+    step = BatchStep(envs, IMAGE[: len(said)], actions, zeros, ends, zeros > 0, config, progress=0.0)
+    return bonus.step(step).tolist()
+
+
+def test_a_line_pays_once_for_each_speaker_and_one_that_differs_in_a_word_is_no_other() -> None:
+    bonus = LineBonus(RunConfig(bonus="lines"), 2)
+    go_on = ended(0, 0)
+    assert pay_for_lines(bonus, [[(1, 0)], []], go_on) == [0.1, 0]
+    assert pay_for_lines(bonus, [[(1, 0)], [(2, 1)]], go_on) == [0, 0.1]
+    assert pay_for_lines(bonus, [[(2, 0), (1, 1)], [(2, 2)]], go_on) == [0.2, 0]
+    assert pay_for_lines(bonus, [[(1, 3)], [(2, 5)]], go_on, scale=0.5) == [0.5, 0.5]
+    assert pay_for_lines(bonus, [[(1, 4)], [(0, 0)]], go_on) == [0, 0], (
+        "what the agent says itself pays nothing"
+    )
+
+
+def test_lines_are_new_again_in_the_next_episode_and_its_end_pays_nothing() -> None:
+    bonus = LineBonus(RunConfig(bonus="lines"), 2)
+    assert pay_for_lines(bonus, [[(1, 0)], [(1, 1)]], ended(0, 1)) == [0.1, 0]
+    assert pay_for_lines(bonus, [[(1, 0)], [(1, 1)]], ended(0, 0)) == [0, 0.1]
+
+
+def test_a_saved_bonus_for_lines_continues_exactly() -> None:
+    rng = np.random.default_rng(0)
+    whole, other = (LineBonus(RunConfig(bonus="lines"), 2) for _ in range(2))
+    for number in range(60):
+        said = [[tuple(rng.integers((1, 0), (3, len(LINES))).tolist())] for _ in range(2)]
+        ends = rng.random(2) < 0.1
+        assert pay_for_lines(whole, said, ends) == pay_for_lines(other, said, ends), number
+        if number % 7 == 0:
+            state, other = whole.state(), LineBonus(RunConfig(bonus="lines"), 2)
+            other.load_state(state)
+    with pytest.raises(ValueError, match="of more than 1 environments"):
+        LineBonus(RunConfig(bonus="lines"), 1).load_state({"heard": np.array([[1, 1, 0]])})
 
 
 def test_a_bonus_of_another_size_is_refused() -> None:

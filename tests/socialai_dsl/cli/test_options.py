@@ -157,6 +157,7 @@ MODEL += "|goal win|grammar|probes off|concurrency 2|timeout 3|budget 9|prices 1
             for one in ("guide_share=0.5", "imitation_coef=1")
         ),
         *(("run corridor.yaml", f"hyper {one}") for one in ("bonus_c=1", "bonus_m=1", "bonus_t=1")),
+        *(("run corridor.yaml --bonus lines", f"hyper {one}") for one in ("bonus_m=1", "bonus_t=1")),
         *(("check corridor.yaml", option) for option in ("agent random", "episodes 9", "fail-under 5")),
         *(
             ("check corridor.yaml --part coverage", option)
