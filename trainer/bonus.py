@@ -31,6 +31,7 @@ class BatchStep(NamedTuple):
         rewards: float64 (E,), the scenario's.
         ended: bool (E,), true where it ended the episode; what is observed and heard is then of the next episode.
         success: bool (E,), true where it ended the episode in success.
+        late: bool (E,), true where it ended the episode because time ran out.
         config: the run's options, with the present values of those that change during the run.
         progress: share of the run's frames made before this rollout, 0 to 1.
     """
@@ -41,6 +42,7 @@ class BatchStep(NamedTuple):
     rewards: NDArray[np.float64]
     ended: NDArray[np.bool_]
     success: NDArray[np.bool_]
+    late: NDArray[np.bool_]
     config: RunConfig
     progress: float
 
@@ -139,12 +141,17 @@ class LineBonus:
     another door each time is paid for once. What the agent says itself, and what is heard as an episode ends, pays
     nothing.
 
+    An agent that lets time run out pays everything back, in the episode's last step. Otherwise it learns to ask without
+    end: before it heeds an answer, what follows is worth less to it than an answer that is still to come.
+
     Attributes:
         heard: for each environment, each speaker's lines, as `heard_lines` numbers them.
+        paid: float64 (E,), in the running episodes.
     """
 
     def __init__(self, config: RunConfig, num_envs: int) -> None:
         self.heard: list[dict[int, set[int]]] = [{} for _ in range(num_envs)]
+        self.paid = np.zeros(num_envs)
         self._words: list[list[str]] = []
         self._alike = lru_cache(None)(self._differ_in_a_word_at_most)
 
@@ -152,7 +159,7 @@ class LineBonus:
         """See `Bonus.step`."""
         self._words = self._words or [words(line) for line in step.envs.lines]
         speakers, lines = step.envs.heard_lines()
-        paid = np.zeros(len(step.ended))
+        paid = np.where(step.late, -self.paid, 0.0)
         for env in np.flatnonzero(step.ended).tolist():
             self.heard[env] = {}
         for env, place in np.argwhere((speakers > _AGENT) & ~step.ended[:, None]).tolist():
@@ -161,6 +168,7 @@ class LineBonus:
             if not any(self._alike(line, other) for other in known):
                 paid[env] += step.config.bonus_c
             known.add(line)
+        self.paid = np.where(step.ended, 0.0, self.paid + paid)
         return paid
 
     def _differ_in_a_word_at_most(self, line: int, other: int) -> bool:
@@ -175,14 +183,14 @@ class LineBonus:
             for speaker, lines in known.items()
             for line in sorted(lines)
         ]
-        return {"heard": np.array(rows, np.int64).reshape(-1, 3)}
+        return {"heard": np.array(rows, np.int64).reshape(-1, 3), "paid": self.paid}
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """See `Bonus.load_state`; a ValueError if it is of more environments."""
-        rows = state["heard"].tolist()
-        if any(env >= len(self.heard) for env, _, _ in rows):
-            raise ValueError(f"bonus: got lines of more than {len(self.heard)} environments")
-        self.heard = [{} for _ in self.heard]
+        """See `Bonus.load_state`; a ValueError if it is of another number of environments."""
+        rows, paid = state["heard"].tolist(), state["paid"]
+        if paid.shape != self.paid.shape or any(env >= len(paid) for env, _, _ in rows):
+            raise ValueError(f"bonus: got lines of {len(paid)} environments, expected {len(self.heard)}")
+        self.heard, self.paid = [{} for _ in self.heard], paid.astype(np.float64)
         for env, speaker, line in rows:
             self.heard[env].setdefault(speaker, set()).add(line)
 

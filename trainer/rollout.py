@@ -177,8 +177,8 @@ def _step(
         tally.count(state, ended, cut, success)
         state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
     if session.bonus is not None:
-        now, progress = session.now, session.progress
-        step = BatchStep(envs, observation["image"], played, reward, ended, success & ended, now, progress)
+        how = ended, success & ended, cut
+        step = BatchStep(envs, observation["image"], played, reward, *how, session.now, session.progress)
         found = session.bonus.step(step)
         paid = require_array("bonus: the result of step", found, ended.shape, np.float64)
         require_finite("what the bonus paid", torch.from_numpy(paid).float())

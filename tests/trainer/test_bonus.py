@@ -26,7 +26,9 @@ class Bonus(EpisodicBonus):
     def pay(self, envs: Any, image: np.ndarray, ended: np.ndarray, **now: float) -> np.ndarray:
         actions, zeros = np.zeros((self.num_envs, 4), np.int64), np.zeros(self.num_envs)
         config = self.config.model_copy(update=now)
-        return self.step(BatchStep(envs, image, actions, zeros, ended, zeros > 0, config, progress=0.0))
+        return self.step(
+            BatchStep(envs, image, actions, zeros, ended, zeros > 0, zeros > 0, config, progress=0.0)
+        )
 
 
 def hears(*ids: int) -> SimpleNamespace:
@@ -164,7 +166,11 @@ LINES = ("I am fine.", "Take the red door.", "Take the blue door.", "Yes.", "No.
 
 
 def pay_for_lines(
-    bonus: LineBonus, said: list[list[tuple[int, int]]], ends: np.ndarray, scale: float = 0.1
+    bonus: LineBonus,
+    said: list[list[tuple[int, int]]],
+    ends: np.ndarray,
+    late: np.ndarray | None = None,
+    scale: float = 0.1,
 ) -> list[float]:
     """What each environment is paid, where (speaker, line) pairs are heard."""
     most = max(map(len, said))
@@ -173,7 +179,8 @@ def pay_for_lines(
     envs = SimpleNamespace(heard_lines=lambda: heard, lines=LINES)
     config, zeros = RunConfig(bonus="lines", bonus_c=scale), np.zeros(len(said))
     actions = np.zeros((len(said), 4), np.int64)
-    step = BatchStep(envs, IMAGE[: len(said)], actions, zeros, ends, zeros > 0, config, progress=0.0)
+    how = ends, zeros > 0, ends & False if late is None else late
+    step = BatchStep(envs, IMAGE[: len(said)], actions, zeros, *how, config, progress=0.0)
     return bonus.step(step).tolist()
 
 
@@ -195,18 +202,27 @@ def test_lines_are_new_again_in_the_next_episode_and_its_end_pays_nothing() -> N
     assert pay_for_lines(bonus, [[(1, 0)], [(1, 1)]], ended(0, 0)) == [0, 0.1]
 
 
+def test_who_lets_time_run_out_pays_back_what_the_episode_paid() -> None:
+    bonus = LineBonus(RunConfig(bonus="lines"), 2)
+    for line in (0, 1):
+        assert pay_for_lines(bonus, [[(1, line)], [(1, line)]], ended(0, 0)) == [0.1, 0.1]
+    assert pay_for_lines(bonus, [[], []], ended(1, 1), ended(0, 1)) == [0, -0.2]
+    assert pay_for_lines(bonus, [[], []], ended(1, 1), ended(1, 1)) == [0, 0], "nothing was paid since"
+
+
 def test_a_saved_bonus_for_lines_continues_exactly() -> None:
     rng = np.random.default_rng(0)
     whole, other = (LineBonus(RunConfig(bonus="lines"), 2) for _ in range(2))
     for number in range(60):
         said = [[tuple(rng.integers((1, 0), (3, len(LINES))).tolist())] for _ in range(2)]
         ends = rng.random(2) < 0.1
-        assert pay_for_lines(whole, said, ends) == pay_for_lines(other, said, ends), number
+        late = ends & (rng.random(2) < 0.5)
+        assert pay_for_lines(whole, said, ends, late) == pay_for_lines(other, said, ends, late), number
         if number % 7 == 0:
             state, other = whole.state(), LineBonus(RunConfig(bonus="lines"), 2)
             other.load_state(state)
-    with pytest.raises(ValueError, match="of more than 1 environments"):
-        LineBonus(RunConfig(bonus="lines"), 1).load_state({"heard": np.array([[1, 1, 0]])})
+    with pytest.raises(ValueError, match="lines of 2 environments, expected 1"):
+        LineBonus(RunConfig(bonus="lines"), 1).load_state(whole.state())
 
 
 def test_a_bonus_of_another_size_is_refused() -> None:

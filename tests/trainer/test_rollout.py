@@ -121,17 +121,28 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     assert (terminal.bootstrap == 0).all()
 
 
+class Remembers:
+    """A bonus that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.steps: list[BatchStep] = []
+
+    def step(self, step: BatchStep) -> np.ndarray:
+        copied = [array.copy() for array in step[1:7]]
+        self.steps.append(BatchStep(step.envs, *copied, step.config, step.progress))
+        return np.full(8, 0.5)
+
+
+def test_a_bonus_is_told_where_time_ran_out(small_config: Any) -> None:
+    session = Session.start(small_config(), EchoEnvs(8, limit=4))
+    session.bonus = told = Remembers()  # type: ignore[assignment]
+    rollout = collect(session)
+    assert sum(step.late.sum() for step in told.steps) == rollout.tally.timeouts > 0
+    assert all((step.ended | ~step.late).all() for step in told.steps)
+
+
 def test_a_bonus_is_told_what_was_played_and_paid_and_when(small_config: Any) -> None:
     """In the third of four updates, with a scale that has gone half the way to its end."""
-
-    class Remembers:
-        def __init__(self) -> None:
-            self.steps: list[BatchStep] = []
-
-        def step(self, step: BatchStep) -> np.ndarray:
-            copied = [array.copy() for array in step[1:6]]
-            self.steps.append(BatchStep(step.envs, *copied, step.config, step.progress))
-            return np.full(8, 0.5)
 
     config = small_config(frames=8 * 8 * 4, bonus_c=4.0, bonus_c_end=0.0, guide="script", guide_share=1.0)
     envs = EchoEnvs(8)
