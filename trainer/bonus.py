@@ -208,9 +208,8 @@ def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
     """The bonus that a configuration names, None for `none`. Raises ValueError if it is not there or lacks a method."""
     if config.bonus == "none":
         return None
-    if config.bonus == "lines":
-        return LineBonus(config, num_envs)
     if config.bonus in SHIPPED:
-        return EpisodicBonus(config, num_envs)
-    own: type[Bonus] = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
-    return own(config, num_envs)
+        return (LineBonus if config.bonus == "lines" else EpisodicBonus)(config, num_envs)
+    own = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
+    found: Bonus = own(config, num_envs)
+    return found

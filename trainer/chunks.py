@@ -83,7 +83,7 @@ def chunks(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Ch
     every = Chunks(
         batch,
         rollout.starts,
-        torch.stack((actor.move(images), tree.leaves[actor.move(histories)]), 2),
+        torch.stack((actor.move(images), actor.move(histories)), 2),
         actor.move(actor.images.data),
         tree,
         memories,

@@ -130,7 +130,7 @@ class Actor:
         rows, fresh = self.histories.add(ids, tokens, self._read)
         if len(fresh):
             tree = prefix_tree(self.histories.data[-len(fresh) :], self.device)
-            self._texts = torch.cat((self._texts, self.net.dialogue(tree)[tree.leaves]))
+            self._texts = torch.cat((self._texts, self.net.dialogue(tree)))
         return rows
 
     def _read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:

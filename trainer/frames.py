@@ -145,7 +145,7 @@ class Stretches:
     def outputs(self, net: ActorCritic) -> Outputs:
         """What the network makes of the frames now."""
         text = net.dialogue(self.tree)
-        pairs = net.perceive(self.prepared, text, self.image_index, self.tree.leaves[self.history_index])
+        pairs = net.perceive(self.prepared, text, self.image_index, self.history_index)
         features = pairs.index_select(0, self.frame_index)
         memory = net.memory(features.view(*self.starts.shape, -1), self.starts, self.memory).flatten(0, 1)
         logits, values = net.heads(memory)

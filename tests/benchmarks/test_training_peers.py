@@ -150,7 +150,9 @@ def frames(count: int) -> tuple[Tensor, np.ndarray]:
 
 def ours(net: ActorCritic, images: Tensor, tokens: np.ndarray) -> Tensor:
     tree = prefix_tree(tokens)
-    return net.perceive(net.prepare(images), net.dialogue(tree), torch.arange(len(images)), tree.leaves)
+    return net.perceive(
+        net.prepare(images), net.dialogue(tree), torch.arange(len(images)), torch.arange(len(images))
+    )
 
 
 def copy(targets: dict[str, Tensor], sources: list[Tensor]) -> None:

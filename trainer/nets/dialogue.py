@@ -23,12 +23,14 @@ class PrefixTree(NamedTuple):
         parents: int64 (K,) state it continues.
         offsets: K's running total by length, starting at 0.
         leaves: int64 (D,) state of each history given to `prefix_tree`.
+        words: int64 (D, L), the histories themselves, 0-padded.
     """
 
     tokens: Tensor
     parents: Tensor
     offsets: list[int]
     leaves: Tensor
+    words: Tensor
 
 
 def prefix_tree(histories: NDArray[Any], device: torch.device | str = "cpu") -> PrefixTree:
@@ -44,10 +46,10 @@ def prefix_tree(histories: NDArray[Any], device: torch.device | str = "cpu") -> 
         offsets.append(offsets[-1] + len(edges))
         levels.append(edges)
     edges = np.concatenate(levels)
-    tokens, parents, leaves = (
-        torch.from_numpy(part).to(device) for part in (edges & 0xFFFFFFFF, edges >> 32, state)
+    tokens, parents, leaves, paths = (
+        torch.from_numpy(part).to(device) for part in (edges & 0xFFFFFFFF, edges >> 32, state, words)
     )
-    return PrefixTree(tokens, parents, offsets, leaves)
+    return PrefixTree(tokens, parents, offsets, leaves, paths)
 
 
 class _TreeGru(torch.autograd.Function):
@@ -122,9 +124,9 @@ class DialogueEncoder(nn.Module):
         self.gru = nn.GRU(hidden, hidden)
 
     def forward(self, tree: PrefixTree) -> Tensor:
-        """Encode the states of a tree, level by level; (K + 1, size), the empty history's row 0 being zero."""
+        """Encode the histories of a tree, (D, size), those with a shared beginning together; the empty one is zero."""
         if not len(tree.tokens):  # nothing was heard, so no weight takes part
-            return self.embedding.weight.new_zeros(1, self.hidden)
+            return self.embedding.weight.new_zeros(len(tree.leaves), self.hidden)
         w_ih, w_hh = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("weight_hh_l0")
         b_ih, b_hh = self.gru.get_parameter("bias_ih_l0"), self.gru.get_parameter("bias_hh_l0")
         words = functional.linear(self.embedding.weight, w_ih, b_ih)  # (V, 3 * hidden)
@@ -132,7 +134,7 @@ class DialogueEncoder(nn.Module):
         states: Tensor = _TreeGru.apply(  # type: ignore[no-untyped-call]
             inputs, w_hh, b_hh, tree.parents, tree.offsets
         )
-        return states
+        return states.index_select(0, tree.leaves)
 
 
 class HeardWords(DialogueEncoder):
@@ -153,9 +155,6 @@ class HeardWords(DialogueEncoder):
     def forward(self, tree: PrefixTree) -> Tensor:
         """See `DialogueEncoder.forward`."""
         states = super().forward(tree)
-        heard = states.new_zeros(len(states), self.embedding.num_embeddings)
-        # Level by level: a history has the words of its parent, and one more.
-        for first, behind in pairwise(tree.offsets):
-            words = heard.index_select(0, tree.parents[first:behind])
-            heard[1 + first : 1 + behind] = words.scatter_(1, tree.tokens[first:behind, None], 1)
+        heard = states.new_zeros(len(states), self.embedding.num_embeddings).scatter_(1, tree.words, 1)
+        heard[:, 0] = 0  # padding
         return torch.cat((states, heard), 1)

@@ -73,27 +73,26 @@ class HeardLines(HeardWords):
         for first, behind in pairwise(tree.offsets):
             level = tree.parents[first:behind] - (first - len(sums[-1]) + 1)
             sums.append(sums[-1].index_select(0, level) + added[first:behind])
-        return torch.cat((base, torch.cat(sums), *self._said(tree, base)), 1)
+        return torch.cat((base, torch.cat(sums)[tree.leaves], *self._said(tree.words, base)), 1)
 
     @torch.no_grad()
-    def _said(self, tree: PrefixTree, like: Tensor) -> tuple[Tensor, Tensor]:
-        """Each speaker's words (K + 1, S * V), and who was named by another (K + 1, S)."""
-        count, words = len(tree.tokens) + 1, self._widths[1]
-        said, named = like.new_zeros(count, self.speakers, words), like.new_zeros(count, self.speakers)
-        speaking = tree.tokens.new_full((count,), -1)
-        for first, behind in pairwise(tree.offsets) if self.speakers else ():
-            parents, tokens = tree.parents[first:behind], tree.tokens[first:behind]
-            marked = self.speaker_of[tokens]
-            who = torch.where(marked >= 0, marked, speaking[parents])
-            at = slice(first + 1, behind + 1)
-            speaking[at], said[at], named[at] = who, said[parents], named[parents]
-            rows = torch.arange(first + 1, behind + 1, device=who.device)
-            word = (who >= 0) & (marked < 0)
-            said[rows[word], who[word], tokens[word]] = 1
-            whom = self.named[tokens]
-            other = word & (whom >= 0) & (whom != who)
-            named[rows[other], whom[other]] = 1
-        return said.flatten(1), named
+    def _said(self, words: Tensor, like: Tensor) -> tuple[Tensor, Tensor]:
+        """Each speaker's words (D, S * V), and who was named by another (D, S), in histories (D, L)."""
+        count, length = words.shape
+        said = like.new_zeros(count, self.speakers + 1, self._widths[1])  # the last row: of nobody
+        named = like.new_zeros(count, self.speakers + 1)
+        marked = self.speaker_of[words]
+        place = torch.arange(length, device=words.device)
+        begins = (
+            torch.where(marked >= 0, place, -1).cummax(1).values if length else words
+        )  # (D, L), of its line
+        who = torch.where(begins >= 0, marked.gather(1, begins.clamp(min=0)), -1)
+        rows = torch.arange(count, device=words.device)[:, None].expand_as(words)
+        speaking = (words > 0) & (marked < 0)
+        said[rows, torch.where(speaking, who, -1), words] = 1
+        whom = self.named[words]
+        named[rows, torch.where(speaking & (who >= 0) & (whom != who), whom, -1)] = 1
+        return said[:, : self.speakers].flatten(1), named[:, : self.speakers]
 
 
 class RelationsNet(FastNet):

@@ -35,9 +35,8 @@ def encode_one_by_one(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
 
 
 def encode_tree(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
-    tree = prefix_tree(rows)
-    states: Tensor = encoder(tree)
-    return states[tree.leaves]
+    encoded: Tensor = encoder(prefix_tree(rows))
+    return encoded
 
 
 def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: DialogueEncoder) -> None:

@@ -37,7 +37,7 @@ def test_words_are_known_by_speaker_and_who_was_named_by_another(encoder: HeardL
     lines = [["<Ann>", "hello"], ["<Bob>", "ann", "no"], ["<Bob>", "bob", "red"], ["<Ann>", "yes"]]
     rows = [[WORDS.index(word) for line in lines[:count] for word in line] for count in range(5)]
     padded = np.array([row + [0] * (12 - len(row)) for row in rows])
-    *_, said, named = encoder.parts(encoder(tree := prefix_tree(padded))[tree.leaves])
+    *_, said, named = encoder.parts(encoder(prefix_tree(padded)))
     assert said.shape == (5, 2, len(WORDS))
     heard = [[{WORDS[i] for i in np.flatnonzero(words)} for words in row] for row in said.detach().numpy()]
     assert heard[1] == [{"hello"}, set()]
@@ -48,7 +48,7 @@ def test_words_are_known_by_speaker_and_who_was_named_by_another(encoder: HeardL
 def test_without_marks_nobody_speaks() -> None:
     encoder = HeardLines([word for word in WORDS if word[:1] != "<" or word in ("<pad>", "<unk>")])
     assert encoder.speakers == 0
-    assert encoder(prefix_tree(np.array([[2, 3, 4]]))).shape == (4, encoder.size)
+    assert encoder(prefix_tree(np.array([[2, 3, 4]]))).shape == (1, encoder.size)
 
 
 class Fewer(RelationsNet):
@@ -61,7 +61,7 @@ def test_a_subclass_may_have_fewer_parts(net: type[RelationsNet], sight: type[Si
     assert type(made.sight) is sight
     assert hasattr(made, "forms") == (net is RelationsNet)
     images = torch.zeros(3, *made.sight.shape, dtype=torch.uint8)
-    text = made.dialogue(tree := prefix_tree(conversations(2, 12)))[tree.leaves]
+    text = made.dialogue(prefix_tree(conversations(2, 12)))
     index = torch.arange(len(text))
     found = made.perceive(made.prepare(images), text, index % 3, index)
     assert found.shape == (len(text), made.features)
