@@ -70,8 +70,8 @@ class _Starts(BaseModel):
     envs: int = _flag(256, "environments stepped together (measured)", ge=1, le=65_536)
     net: Name = _flag(
         "fast",
-        "fast, relations, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the paper's "
-        "network, update and numbers",
+        "fast, relations, speakers, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the "
+        "paper's network, update and numbers",
     )
     algorithm: Name = _flag("ppo", "how the network learns: ppo or mine:Algorithm")
     precision: Literal["float32", "bfloat16"] = _flag("float32", "numbers of the convolutions of `paper`")

@@ -28,7 +28,7 @@ Labels = Annotated[
     BeforeValidator(_one_or_many, json_schema_input_type=Label | tuple[Label, ...]),
 ]
 
-NETS: Final = ("fast", "relations", "paper", "paper-reference", "paper-reference-tuned")
+NETS: Final = ("fast", "relations", "speakers", "paper", "paper-reference", "paper-reference-tuned")
 """The networks and presets that ship, as `socialai-run --net` takes them."""
 
 AGENTS: Final = ("ppo", "random", "oracle")

@@ -19,25 +19,17 @@ def encode(dialogue: DialogueEncoder, tokens: np.ndarray) -> Tensor:
         return state
     parts = [state, torch.tensor([float(w in words) for w in range(len(weight))], dtype=weight.dtype)]
     if isinstance(dialogue, HeardLines):
-        parts += [*heard_lines(dialogue, words.tolist(), weight)]
+        parts.append(sum_in_order(dialogue, words.tolist()))
     return torch.cat(parts)
 
 
-def heard_lines(dialogue: HeardLines, words: list[int], like: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """The sum over the words in their order, the words of each speaker, and who was named by another."""
-    order = like.new_zeros(dialogue.order)
-    said = like.new_zeros(dialogue.speakers, len(like))
-    named = like.new_zeros(dialogue.speakers)
-    before, speaking = 0, -1
+def sum_in_order(dialogue: HeardLines, words: list[int]) -> Tensor:
+    """The sum of each word's products with the word before it and with its place."""
+    order = dialogue.pairs.new_zeros(dialogue.order)
+    before = 0
     for depth, word in enumerate(words):
         if before:
             order = order + dialogue.pairs[before, 0] * dialogue.pairs[word, 1]
         order = order + dialogue.places[min(depth, dialogue.PLACES - 1)] * dialogue.placed[word]
         before = word
-        if (mark := int(dialogue.speaker_of[word])) >= 0:
-            speaking = mark
-        elif speaking >= 0:
-            said[speaking, word] = 1
-            if (whom := int(dialogue.named[word])) not in (-1, speaking):
-                named[whom] = 1
-    return order, said.flatten(), named
+    return order

@@ -12,12 +12,23 @@ from trainer.nets.fast import FastNet
 from trainer.nets.memory import Memory
 from trainer.nets.paper import PaperNet, PaperReferenceNet
 from trainer.nets.relations import RelationsNet
+from trainer.nets.speakers import SpeakersNet
 
-__all__ = ["ActorCritic", "FastNet", "Memory", "NetSpec", "RelationsNet", "build_net", "net_class"]
+__all__ = [
+    "ActorCritic",
+    "FastNet",
+    "Memory",
+    "NetSpec",
+    "RelationsNet",
+    "SpeakersNet",
+    "build_net",
+    "net_class",
+]
 
 _SHIPPED: dict[str, type[ActorCritic]] = {
     "fast": FastNet,
     "relations": RelationsNet,
+    "speakers": SpeakersNet,
     "paper": PaperNet,
     "paper-reference": PaperReferenceNet,
     "paper-reference-tuned": PaperReferenceNet,

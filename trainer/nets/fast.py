@@ -63,7 +63,28 @@ class FastNet(ActorCritic):
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         used, history = torch.unique(text_index, return_inverse=True)
         state, heard = self.dialogue.split(text.index_select(0, used))  # (S, hidden), (S, V)
-        channel = torch.arange(self.channels.shape[0], device=text.device)
+        return self.read(prepared, state, heard, self.words(state), image_index, history)
+
+    def read(
+        self,
+        prepared: Cells,
+        state: Tensor,
+        heard: Tensor,
+        said: Tensor,
+        image_index: Tensor,
+        history: Tensor,
+    ) -> Tensor:
+        """Features (P, width) of pairs of an image and one of S histories.
+
+        Args:
+            prepared: see `prepare`.
+            state: (S, hidden), which scales and shifts the cells.
+            heard: (S, V), how much each word scales the cells that it mentions.
+            said: (S, width), added to what is seen.
+            image_index: int64 (P,).
+            history: int64 (P,).
+        """
+        channel = torch.arange(self.channels.shape[0], device=heard.device)
         kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
         mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2)  # (S, C)
         scale, shift = self.film(state)[:, None].chunk(2, 2)
@@ -71,5 +92,4 @@ class FastNet(ActorCritic):
         read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))  # (S, C, kind_size)
         rows = history[:, None] * len(kinds) + prepared.kind_of.index_select(0, image_index)  # (P, cells)
         cells = read.flatten(0, 1).index_select(0, rows.flatten()).view(len(rows), -1)
-        said = self.words(state).index_select(0, history)
-        return torch.relu(self.cells(cells) + said)
+        return torch.relu(self.cells(cells) + said.index_select(0, history))

@@ -15,18 +15,11 @@ from trainer.nets.sight import MapSight, Sight
 
 
 class HeardLines(HeardWords):
-    """The encoding of `HeardWords`, then sums over the words in their order, then who said what.
+    """The encoding of `HeardWords`, then sums over the words in their order.
 
     Every word adds the product of its own embedding with that of the word before it, and one with that of its place. So
     the sum depends on the order of the words, and the gradient reaches each word from the first update on, however much
     was said since.
-
-    Where tokens mark speakers, the encoding also has the words of each speaker, and whether another has named them.
-
-    Attributes:
-        speakers: how many there are, by the marks in the vocabulary.
-        speaker_of: int64 (V,), the speaker that a token marks. named: int64 (V,), the speaker whose name ends with the
-            word. Both -1 for none.
     """
 
     PLACES = 64
@@ -38,28 +31,14 @@ class HeardLines(HeardWords):
         self.pairs = nn.Parameter(torch.randn(words, 2, order) * 0.6)  # as the word before, and as the word
         self.placed = nn.Parameter(torch.randn(words, order) * 0.6)
         self.places = nn.Parameter(torch.randn(self.PLACES, order) * 0.6)
-        # No word of a text begins so; the first two ids are padding and the unknown word.
-        marks = [number for number, word in enumerate(vocabulary) if number > 1 and word[:1] == "<"]
-        ids = {word: number for number, word in enumerate(vocabulary)}
-        self.speakers = len(marks)
-        speaker_of, named_by = torch.full((2, words), -1).unbind()
-        for speaker, mark in enumerate(marks):
-            speaker_of[mark] = speaker
-            name = vocabulary[mark].strip("<>").lower().split()[-1:]
-            named_by[[ids[word] for word in name if word in ids]] = speaker
-        self.speaker_of: Tensor
-        self.register_buffer("speaker_of", speaker_of, persistent=False)
-        self.named: Tensor
-        self.register_buffer("named", named_by, persistent=False)
-        self._widths = (hidden, words, order, self.speakers * words, self.speakers)
-        self.size = sum(self._widths)
+        self.size = hidden + words + order
 
-    def parts(self, encodings: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """Encodings (D, size) as recurrent states (D, hidden), the words heard (D, V), sums over the order (D, order),
-        the words of each speaker (D, S, V) and who was named by another (D, S).
+    def parts(self, encodings: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Encodings (D, size) as recurrent states (D, hidden), the words heard (D, V), and sums over the order
+        (D, order).
         """
-        state, heard, order, said, named = torch.split(encodings, list(self._widths), 1)
-        return state, heard, order, said.view(len(said), self.speakers, heard.shape[1]), named
+        state, heard, order = torch.split(encodings, [self.hidden, len(self.pairs), self.order], 1)
+        return state, heard, order
 
     def forward(self, tree: PrefixTree) -> Tensor:
         """See `DialogueEncoder.forward`."""
@@ -73,26 +52,7 @@ class HeardLines(HeardWords):
         for first, behind in pairwise(tree.offsets):
             level = tree.parents[first:behind] - (first - len(sums[-1]) + 1)
             sums.append(sums[-1].index_select(0, level) + added[first:behind])
-        return torch.cat((base, torch.cat(sums)[tree.leaves], *self._said(tree.words, base)), 1)
-
-    @torch.no_grad()
-    def _said(self, words: Tensor, like: Tensor) -> tuple[Tensor, Tensor]:
-        """Each speaker's words (D, S * V), and who was named by another (D, S), in histories (D, L)."""
-        count, length = words.shape
-        said = like.new_zeros(count, self.speakers + 1, self._widths[1])  # the last row: of nobody
-        named = like.new_zeros(count, self.speakers + 1)
-        marked = self.speaker_of[words]
-        place = torch.arange(length, device=words.device)
-        begins = (
-            torch.where(marked >= 0, place, -1).cummax(1).values if length else words
-        )  # (D, L), of its line
-        who = torch.where(begins >= 0, marked.gather(1, begins.clamp(min=0)), -1)
-        rows = torch.arange(count, device=words.device)[:, None].expand_as(words)
-        speaking = (words > 0) & (marked < 0)
-        said[rows, torch.where(speaking, who, -1), words] = 1
-        whom = self.named[words]
-        named[rows, torch.where(speaking & (who >= 0) & (whom != who), whom, -1)] = 1
-        return said[:, : self.speakers].flatten(1), named[:, : self.speakers]
+        return torch.cat((base, torch.cat(sums)[tree.leaves]), 1)
 
 
 class RelationsNet(FastNet):
@@ -105,18 +65,15 @@ class RelationsNet(FastNet):
     * `order`: a layer reads the words in their order (`HeardLines`).
     * `products`: products of two sums over the words heard say what words mean together, as a tone and a remark do.
     * `again`: what was seen and said decides what is looked for in a second reading of the cells.
-    * `speakers`: where tokens mark who speaks, words count by who said them, and by whether another has named them.
 
     Attributes:
         forms: (V, 2, F), the two sums of each product.
         again: (V, channels, 256, G), how much a word scales the cells that have a code in the second reading; each
             part of it has a gate.
-        trust: of a speaker's words, and how much more of one whom another has named.
     """
 
-    parts: frozenset[str] = frozenset(("map", "order", "products", "again", "speakers"))
+    parts: frozenset[str] = frozenset(("map", "order", "products", "again"))
     FORMS, GATES = 32, 4
-    SWAY = 5.0  # times `trust`: two numbers that decide about every word have to move faster than the weights of one
     sight_class: type[Sight] = MapSight
     word_rows = (*FastNet.word_rows, "again", "forms", "dialogue.pairs", "dialogue.placed")
     dialogue: HeardLines
@@ -143,15 +100,11 @@ class RelationsNet(FastNet):
             self.again = nn.Parameter(torch.zeros(words, len(self.channels), 256, self.GATES))
             self.second = nn.Linear(self.cells.in_features, width)
             self.join = nn.Linear(2 * width, width)
-        self.by_speaker = "speakers" in self.parts and self.dialogue.speakers > 0
-        if self.by_speaker:
-            self.trust = nn.Parameter(torch.tensor([1.0, 0.0]) / self.SWAY)
-            self.lines = nn.Linear(self.dialogue.speakers * (words + 1), width, bias=False)
 
     def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         used, history = torch.unique(text_index, return_inverse=True)
-        state, heard, order, said, named = self.dialogue.parts(text.index_select(0, used))  # (S, ...) each
+        state, heard, order = self.dialogue.parts(text.index_select(0, used))  # (S, ...) each
         gates = heard.new_zeros(len(heard), 1 + self.GATES)
         spoken, past = self.words(state), heard.new_zeros(len(heard), self.features)  # (S, width)
         if "order" in self.parts:
@@ -159,10 +112,6 @@ class RelationsNet(FastNet):
         if "products" in self.parts:
             forms = torch.einsum("sv,vaf->saf", heard, self.forms).prod(1)  # (S, FORMS)
             gates, past = self.meaning(forms), past + torch.relu(self.meant(forms))
-        if self.by_speaker:
-            trust = self.SWAY * self.trust
-            heard = torch.einsum("sn,snv->sv", trust[0] + trust[1] * named, said)
-            spoken = spoken + self.lines(torch.cat((said.flatten(1), named), 1))
         channel = torch.arange(len(self.channels), device=text.device)
         kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
         mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2) * (1 + gates[:, :1])  # (S, C)

@@ -1,6 +1,5 @@
-"""What the network `relations` hears agrees with reading histories from their first word, line by line."""
+"""What the network `relations` hears agrees with reading histories from their first word."""
 
-import numpy as np
 import pytest
 import torch
 
@@ -11,7 +10,6 @@ from trainer.nets.relations import HeardLines, RelationsNet
 from trainer.nets.sight import MapSight, Sight
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
-ANN, BOB = 0, 1
 
 
 @pytest.fixture
@@ -31,24 +29,6 @@ def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: HeardLines
     )
     for name, one, other in zip(named, wanted, got, strict=True):
         assert torch.allclose(one, other, rtol=0, atol=1e-12), name
-
-
-def test_words_are_known_by_speaker_and_who_was_named_by_another(encoder: HeardLines) -> None:
-    lines = [["<Ann>", "hello"], ["<Bob>", "ann", "no"], ["<Bob>", "bob", "red"], ["<Ann>", "yes"]]
-    rows = [[WORDS.index(word) for line in lines[:count] for word in line] for count in range(5)]
-    padded = np.array([row + [0] * (12 - len(row)) for row in rows])
-    *_, said, named = encoder.parts(encoder(prefix_tree(padded)))
-    assert said.shape == (5, 2, len(WORDS))
-    heard = [[{WORDS[i] for i in np.flatnonzero(words)} for words in row] for row in said.detach().numpy()]
-    assert heard[1] == [{"hello"}, set()]
-    assert heard[4] == [{"hello", "yes"}, {"ann", "no", "bob", "red"}]
-    assert named.tolist() == [[0, 0], [0, 0], [1, 0], [1, 0], [1, 0]], "nobody is named by his own lines"
-
-
-def test_without_marks_nobody_speaks() -> None:
-    encoder = HeardLines([word for word in WORDS if word[:1] != "<" or word in ("<pad>", "<unk>")])
-    assert encoder.speakers == 0
-    assert encoder(prefix_tree(np.array([[2, 3, 4]]))).shape == (1, encoder.size)
 
 
 class Fewer(RelationsNet):
