@@ -138,9 +138,11 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
 }
 
-# What the trainer may use: environments, curricula, and what plays episodes; no scenario's insides.
+# What the trainer may use: environments, curricula, what plays episodes, and the words of the language, such as the
+# names of colours; no scenario's insides.
 FACADE = {
-    f"socialai_dsl.{name}" for name in ("envs.factory", "episodes.policies", "frontend", "schema.curriculum")
+    f"socialai_dsl.{name}"
+    for name in ("envs.factory", "episodes.policies", "frontend", "schema.curriculum", "vocabulary")
 }
 
 

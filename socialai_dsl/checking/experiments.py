@@ -12,11 +12,10 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.loader.reader import SUFFIXES, display_name
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
-from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
+from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
 from socialai_dsl.source import DataPath
-from trainer.config import BONUS_SCALES
 from trainer.shipped import PREFIX, shipped_agents
 
 
@@ -144,7 +143,7 @@ def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: Diagnostic
         bag.error("S703", message, resolved.tree.value_span(cell.places["agent"]), suggestion=near, hint=hint)
 
 
-_NAMES: Final = {"net": NETS, "bonus": ("none", "auto", *BONUS_SCALES), "guide": ("none", "script")}
+_NAMES: Final = {"net": NETS, "bonus": BONUSES, "guide": ("none", "script")}
 """Options that name something shipped, or a class of the user's as `mine:Class`."""
 
 

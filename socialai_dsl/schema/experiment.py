@@ -18,7 +18,7 @@ from pydantic import (
 from socialai_dsl.errors import first_mistake
 from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many
 from socialai_dsl.schema.suite import MemberName
-from trainer.config import FLAGS, HYPER, MOST_FRAMES, RunConfig
+from trainer.config import BONUS_SCALES, FLAGS, HYPER, MOST_FRAMES, RunConfig
 
 Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""
@@ -30,6 +30,9 @@ Labels = Annotated[
 
 NETS: Final = ("fast", "relations", "speakers", "paper", "paper-reference", "paper-reference-tuned")
 """The networks and presets that ship, as `socialai-run --net` takes them."""
+
+BONUSES: Final = ("none", "auto", *BONUS_SCALES)
+"""The bonuses that ship, and the paper's choice for the scenario."""
 
 AGENTS: Final = ("ppo", "random", "oracle")
 """The agents that are no checkpoint."""
