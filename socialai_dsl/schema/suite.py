@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
-from socialai_dsl.schema.scenario import WORD_SCHEMA, ListOf, Model, Prose, UtteranceGrammar, Word
+from socialai_dsl.schema.scenario import WORD_SCHEMA, ListOf, Model, Prose, UtteranceGrammar, Word, as_written
 from socialai_dsl.vocabulary import Primitive
 
 MemberName = Annotated[str, Field(min_length=1, max_length=200)]
@@ -40,7 +40,9 @@ class Entry(Changes):
     """A member that the suite changes."""
 
     scenario: MemberName = Field(description="the scenario, with variants and parameters")
-    name: Word | None = Field(None, description="its name in the suite; default the scenario's name")
+    name: Annotated[Word | None, as_written(Word | bool | None)] = Field(
+        None, description="its name in the suite; default the scenario's name"
+    )
 
 
 class Value(Changes):
