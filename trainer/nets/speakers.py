@@ -9,7 +9,7 @@ from typing import Final
 import torch
 from torch import Tensor, nn
 
-from socialai_dsl.vocabulary import COLORS
+from socialai_dsl.vocabulary import COLORS, words
 from trainer.nets.base import NetSpec
 from trainer.nets.dialogue import DialogueEncoder, PrefixTree
 from trainer.nets.fast import Cells, FastNet
@@ -33,7 +33,7 @@ class HeardSpeakers(DialogueEncoder):
 
     def __init__(self, vocabulary: Sequence[str], hidden: int = 128) -> None:
         nn.Module.__init__(self)
-        words = len(vocabulary)
+        size = len(vocabulary)
         # No word of a text begins so; the first two ids are padding and the unknown word.
         marks = [number for number, word in enumerate(vocabulary) if number > 1 and word[:1] == "<"]
         if not marks:
@@ -43,17 +43,16 @@ class HeardSpeakers(DialogueEncoder):
             )
         ids = {word: number for number, word in enumerate(vocabulary)}
         self.hidden, self.speakers = hidden, len(marks)
-        speaker_of, named = torch.full((2, words), -1).unbind()
+        speaker_of, named = torch.full((2, size), -1).unbind()
         for speaker, mark in enumerate(marks):
             speaker_of[mark] = speaker
-            name = vocabulary[mark].strip("<>").lower().split()[-1:]
-            named[[ids[word] for word in name if word in ids]] = speaker
+            named[[ids[word] for word in words(vocabulary[mark])[-1:] if word in ids]] = speaker
         self.speaker_of: Tensor
         self.register_buffer("speaker_of", speaker_of, persistent=False)
         self.named: Tensor
         self.register_buffer("named", named, persistent=False)
-        self.summed = nn.Parameter(word_weights(words, self.speakers, hidden))
-        self._sizes = (hidden, self.speakers * words, self.speakers * words, self.speakers)
+        self.summed = nn.Parameter(word_weights(size, self.speakers, hidden))
+        self._sizes = (hidden, self.speakers * size, self.speakers * size, self.speakers)
         self.size = sum(self._sizes)
 
     def parts(self, encodings: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -71,25 +70,25 @@ class HeardSpeakers(DialogueEncoder):
         return torch.cat((state, said.flatten(1), last.flatten(1), named), 1)
 
     @torch.no_grad()
-    def _read(self, words: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _read(self, heard: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Of histories (D, L) the words of each speaker, those of its last line (D, S, V), and who was named (D, S)."""
-        count, length = words.shape
+        count, length = heard.shape
         nobody = self.speakers
         said, last = self.summed.new_zeros(2, count, nobody + 1, len(self.speaker_of)).unbind()
         named = self.summed.new_zeros(count, nobody + 1)
-        place = torch.arange(length, device=words.device).expand_as(words)
-        marked = self.speaker_of[words]
+        place = torch.arange(length, device=heard.device).expand_as(heard)
+        marked = self.speaker_of[heard]
         starts = torch.where(marked >= 0, place, -1)
         begins = starts.cummax(1).values if length else starts  # where the line of each word begins
         who = torch.where(begins >= 0, marked.gather(1, begins.clamp(min=0)), nobody)
-        latest = torch.full((count, nobody + 1), -1, device=words.device)
+        latest = torch.full((count, nobody + 1), -1, device=heard.device)
         latest.scatter_reduce_(1, torch.where(marked >= 0, marked, nobody), starts, "amax")
-        rows = torch.arange(count, device=words.device)[:, None].expand_as(words)
-        speaking = (words > 0) & (marked < 0)
+        rows = torch.arange(count, device=heard.device)[:, None].expand_as(heard)
+        speaking = (heard > 0) & (marked < 0)
         speaker = torch.where(speaking, who, nobody)
-        said[rows, speaker, words] = 1
-        last[rows, torch.where(begins == latest.gather(1, who), speaker, nobody), words] = 1
-        whom = self.named[words]
+        said[rows, speaker, heard] = 1
+        last[rows, torch.where(begins == latest.gather(1, who), speaker, nobody), heard] = 1
+        whom = self.named[heard]
         named[rows, torch.where((speaker < nobody) & (whom >= 0) & (whom != who), whom, nobody)] = 1
         return said[:, :nobody], last[:, :nobody], named[:, :nobody]
 
@@ -101,8 +100,8 @@ class SpeakersNet(FastNet):
     trusted: any speaker, and one whom another has named. So one who says something else each time does not light up
     everything.
 
-    Two biases are given by hand, and can be taken away by a subclass: what colours are called (`lexicon`), and that it
-    may matter whether somebody was named by another. What follows from either is learnt.
+    Two biases are given by hand: the names of colours (`lexicon`, which a subclass can set to 0), and that `trust` may
+    depend on being named by another speaker. What follows from either is learnt.
 
     Attributes:
         lexicon: how much the name of a colour scales the cells of that colour at first; 0: to be learnt.
