@@ -81,7 +81,7 @@ class Reader:
 
     def _compare(self, text: str) -> None:
         for line in text.splitlines():
-            assert line in self.printed
+            assert line in self.printed, self.printed
 
 
 @pytest.fixture(autouse=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.analysis.effort import keep_time
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.engine.calls import BAD_ACTION, TERMINATED, Task
+from socialai_dsl.engine.calls import BAD_ACTION, TERMINATED, RoomError, Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
 
@@ -52,6 +52,20 @@ def begin(table: Table, seed: Any, options: Mapping[str, Any] | None) -> None:
         mask = np.zeros(table.rows, np.bool_)
         mask[rows] = True
         table.reset(seed, {**(options or {}), "reset_mask": mask})
+
+    _in_portions(np.arange(table.rows), reset)
+
+
+def begin_those_possible(table: Table, seed: int) -> None:
+    """`begin` for rooms of which some cannot be drawn as the scenario's `require` asks; these have ended."""
+
+    def reset(rows: NDArray[np.intp]) -> None:
+        mask = np.zeros(table.rows, np.bool_)
+        mask[rows] = True
+        try:
+            table.reset(seed, {"reset_mask": mask})
+        except RoomError as error:
+            table.state.registers[error.rows, Register.ENDED] = TERMINATED
 
     _in_portions(np.arange(table.rows), reset)
 

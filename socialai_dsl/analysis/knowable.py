@@ -1,10 +1,11 @@
 """Whether and when an agent that perceives everything it can may know what its success depends on.
 
 Of each room *alternatives* are drawn that differ from it in one draw (and in what follows from it), or in what chance
-does during the episode. Where a success of the room is none in an alternative that looks the same, the agent has to
-know which of the two it is in. It can if something that it does makes the two look or sound different while both can
-still be solved, or if one sequence of actions solves both (`guessing`). All else is known to the agent then, so this is
-what the best informed agent can do; what stays hidden to it stays hidden to all.
+does during the episode; others differ in any number of draws and look like the room while it is solved (`alike`).
+Where a success of the room is none in an alternative that looks the same, the agent has to know which of the two it is
+in. It can if something that it does makes the two look or sound different while both can still be solved, or if one
+sequence of actions solves both (`guessing`). All else is known to the agent then, so this is what the best informed
+agent can do; what stays hidden to it stays hidden to all.
 
 A script shows it at once: if it solves both, and acts otherwise only after they look different.
 """
@@ -12,7 +13,7 @@ A script shows it at once: if it solves both, and acts otherwise only after they
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.advance import advance, begin
+from socialai_dsl.analysis.alike import Lookalikes
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
@@ -32,6 +34,7 @@ from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import Program, Register
 
 CHANCE: Final = "chance during the episode"
+TOGETHER: Final = "a combination of draws"
 
 _COPIES: Final = 6
 """How many alternatives are drawn for each draw."""
@@ -50,6 +53,15 @@ class Knowability(Enum):
     UNDECIDED = "undecided"
 
 
+_FROM_BEST: Final = (
+    Knowability.NOTHING_TO_KNOW,
+    Knowability.ALL,
+    Knowability.UNDECIDED,
+    Knowability.HIDDEN,
+    Knowability.NO_SUCCESS,
+)
+
+
 @dataclass(frozen=True)
 class RoomKnown:
     """What an agent can know in one room.
@@ -58,11 +70,14 @@ class RoomKnown:
         known: whether it can know all that its success depends on.
         step: after which it can know all that is asked for, in a way that was found.
         hidden: what stays hidden, and after which step it shows when it is too late; None: never.
+        alike: how many of the rooms drawn beside it, which may differ in any number of draws, look like it until it is
+            solved in the way that was tried.
     """
 
     known: Knowability
     step: int = 0
     hidden: Mapping[str, int | None] | None = None
+    alike: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,6 +113,7 @@ class Knowing:
         begin(self._playing, 0, None)
         self._search = Search(program)
         self._pair = Guessing(program, np.ones(2, np.int64))
+        self._lookalikes = Lookalikes(program, effort.rooms, effort.seed)
         self._wins = wins_of(program)
 
     def look_at(self, room: int) -> RoomKnown:
@@ -112,14 +128,28 @@ class Knowing:
                 return RoomKnown(Knowability.UNDECIDED)
             plan = found.plan
         others = self._others(room)
-        if plan is not None:
-            solved = self._solved(others, plan)
-            others = [other for other, alike in zip(others, solved, strict=True) if not alike]
-        plans = [] if plan is None else [plan]
+        if plan is None:
+            return self._compared(room, others, [], {})
+        solved = self._solved(others, plan)
+        others = [other for other, alike in zip(others, solved, strict=True) if not alike]
+        by_one = self._compared(room, others, [plan], {} if played is None else played.known)
+        if by_one.known is Knowability.HIDDEN:
+            return by_one
+        solved_too, misled = self._lookalikes.followed(room, plan)
+        others = [_Other(number, TOGETHER, self._lookalikes.start(number)) for number in misled[:_TRIED]]
+        by_more = self._compared(room, others, [plan], {})
+        worst = max(by_one, by_more, key=lambda one: _FROM_BEST.index(one.known))
+        step = max(by_one.step, by_more.step)
+        return replace(worst, step=step, alike=len(solved_too) + len(misled))
+
+    def _compared(
+        self, room: int, others: Sequence[_Other], plans: Sequence[Plan], followed: Mapping[int, int]
+    ) -> RoomKnown:
+        """What can be known of a room among alternatives, some of which a script may be followed in (`ScriptRun`)."""
         step, hidden, undecided = None, dict[str, int | None](), False
         for name, tried in _by_name(others):
             for other in tried[:_TRIED]:
-                if played is not None and (known := played.known.get(other.row)) is not None:
+                if (known := followed.get(other.row)) is not None:
                     step = max(step or 0, known) or None
                     continue
                 guess = self._pair.solve(*self._both(room, other), self._effort, plans, surely=True)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from socialai_dsl.analysis.advance import advance, begin, compiled
+from socialai_dsl.analysis.alike import Division, divided, without_unsaid
 from socialai_dsl.analysis.twins import pairs_alike
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.envs.table import Table
@@ -54,10 +54,14 @@ class PerceptionResult:
 
     Attributes:
         pairs: how many of them looked alike at first. peeks: those in which the script peeked.
+        groups: how many groups of rooms that look alike were compared, whatever they differ in.
+        divisions: those in which the script did not act alike.
     """
 
     pairs: int
     peeks: tuple[Peek, ...]
+    groups: int = 0
+    divisions: tuple[Division, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,8 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
     """Play the script in rooms 0 to rooms - 1 of a seed and in a twin for each draw of each room.
 
     In the twin that draw, and what follows from it, has another value. The script's actions for the first room are done
-    in both until the two look or sound different or one of them ends.
+    in both until the two look or sound different or one of them ends. Then it plays many rooms, which may differ in any
+    number of draws, and has to act alike in those that look and sound alike; not if it draws something itself.
 
     Args:
         scripted: a scenario with a frame for the agent.
@@ -84,18 +89,25 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
         seed: of the rooms.
     """
     program = compiled(scripted)
-    pairs = list(_pairs(program, scripted.checked, rooms, seed))
+    pairs, peeks = _in_twins(program, scripted.checked, rooms, seed)
+    groups, divisions = (0, []) if _draws_itself(scripted.checked) else divided(program, rooms, seed)
+    return PerceptionResult(pairs, tuple(peeks), groups, tuple(divisions))
+
+
+def _in_twins(program: Program, checked: CheckedScenario, rooms: int, seed: int) -> tuple[int, list[Peek]]:
+    """How many twins look alike at first, and where the script peeks in them."""
+    pairs = list(_pairs(program, checked, rooms, seed))
     if not pairs:
-        return PerceptionResult(0, ())
+        return 0, []
     table = Table([program], 2 * len(pairs))
     index = [number for pair in pairs for number in (pair.index, pair.twin_index)]
     given = [layout for pair in pairs for layout in (pair.layout, pair.twin)]
     begin(table, seed, {"index": np.array(index), "layout": given})
     running = pairs_alike(table)
-    alike, peeks, step = int(running.sum()), [], 0
+    alike, peeks, step = int(running.sum()), list[Peek](), 0
     while running.any():
         step += 1
-        actions = _said(table.scripted_actions())
+        actions = without_unsaid(table.scripted_actions())
         otherwise = running & (actions[0::2] != actions[1::2]).any(axis=1)
         for k in np.flatnonzero(otherwise).tolist():
             peeks.append(Peek(pairs[k].index, step, pairs[k].draw, pairs[k].values))
@@ -105,14 +117,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
         advance(table)
         running &= (table.state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
         running &= pairs_alike(table)
-    return PerceptionResult(alike, tuple(sorted(peeks, key=lambda peek: (peek.index, peek.step))))
-
-
-def _said(actions: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Actions without the template and noun where nothing is said."""
-    told = actions.copy()
-    told[told[:, 1] == 0, 1:] = 0
-    return told
+    return alike, sorted(peeks, key=lambda peek: (peek.index, peek.step))
 
 
 # --- twins ---

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from socialai_dsl.analysis.advance import advance, begin, compiled
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict, Plan
-from socialai_dsl.analysis.knowable import Knowability, Knowing, RoomKnown, followed
+from socialai_dsl.analysis.knowable import TOGETHER, Knowability, Knowing, RoomKnown, followed
 from socialai_dsl.analysis.muting import muted
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.reports import (
@@ -167,10 +167,11 @@ def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:
 
 
 def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    idle = trial.rooms.solved_by_idling
     findings = list(trial.successes(effort, plan.text))
     tally = Evidence()
     for room, finding in enumerate(findings):
-        if trial.rooms.solved_by_idling[room]:
+        if idle[room]:
             tally.void.setdefault(_OF_ITSELF, []).append(room)
         elif finding.verdict is SearchVerdict.UNDECIDED:
             tally.undecided.append(room)
@@ -251,15 +252,19 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if trial.script is None:
         return _NOBODY_PLAYS
     found = perceived(trial.script, effort.rooms, effort.seed)
-    against = list(dict.fromkeys(peek.index for peek in found.peeks))
+    divided = [number for one in found.divisions for number in one.others]
+    # Of the rooms that were drawn beside those that were asked for, the first will do.
+    divided = [number for number in divided if number < effort.rooms] or sorted(divided)[:1]
+    against = sorted({*(peek.index for peek in found.peeks), *divided})
     held = effort.rooms - len(against)
-    if found.pairs == 0:
+    if found.pairs == found.groups == 0:
         said = "it rests on nothing: no two rooms look alike at first"
         return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
     said = f"in {held} of {rooms_text(effort.rooms)} the script acts on what it has perceived alone"
-    said += f" ({found.pairs} pairs of rooms that look alike at first)"
-    if found.peeks:
-        said += f"; {found.peeks[0]}"
+    said += f" ({found.pairs} pairs of rooms that look alike and differ in one draw, {found.groups} groups that differ in "
+    said += "any)"
+    for one in (*found.peeks, *found.divisions)[:1]:
+        said += f"; {one}"
     share = 1.0 if plan.share is None else plan.share
     verdict = by_share(held, 0, effort.rooms, share)
     return Report(verdict, effort.rooms, held, 0, tuple(against[:SHOWN]), said, effort.rooms, found.pairs)
@@ -532,16 +537,21 @@ class _Draw:
 
 
 def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    # What takes time comes first: once the time is over, nothing is played any more, and what was found would be lost.
+    idle = trial.rooms.solved_by_idling
     knowing = Knowing(trial.rooms, effort, trial.scripted)
     found = list(
         effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Knowability.UNDECIDED)
     )
+    # Where a combination of draws stays hidden, rooms that were compared with no other by it say nothing.
+    combined = any(TOGETHER in (one.hidden or ()) for one in found)
+    found = [_undecided(one) if combined and not one.alike else one for one in found]
     tally = Evidence()
     for room, one in enumerate(found):
         why = _NO_SUCCESS if one.known is Knowability.NO_SUCCESS else None
         if trial.rooms.missing(room, ("agent",)):
             why = "the agent is absent"
-        elif trial.rooms.solved_by_idling[room]:
+        elif idle[room]:
             why = _OF_ITSELF
         if why is not None:
             tally.void.setdefault(why, []).append(room)
@@ -550,7 +560,19 @@ def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         else:
             is_so = (one.known is not Knowability.HIDDEN) is plan.expected
             (tally.held if is_so else tally.against).append(room)
-    return tally.report(_said_of(found), 1.0 if plan.share is None else plan.share)
+    said = _said_of(found)
+    if any(one.known is Knowability.ALL for one in found):
+        said += _AMONG_OTHERS.format(sum(one.alike > 0 for one in found) or "none")
+    return tally.report(said, 1.0 if plan.share is None else plan.share)
+
+
+_AMONG_OTHERS: Final = "; {} of them look like some that differ in several draws"
+
+
+def _undecided(known: RoomKnown) -> RoomKnown:
+    """What is known of a room that was compared with too few others."""
+    certain = known.known in (Knowability.HIDDEN, Knowability.NO_SUCCESS)
+    return known if certain else replace(known, known=Knowability.UNDECIDED)
 
 
 def _said_of(found: Collection[RoomKnown]) -> str:

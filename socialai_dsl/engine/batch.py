@@ -205,12 +205,14 @@ class Batch:
 
     def refused_room(self) -> RoomError:
         """Why a call returned less than BAD_ACTION; after it play may go on."""
-        row = int(np.flatnonzero(self.ports.refused)[0])
+        rows = np.flatnonzero(self.ports.refused).tolist()
+        row = rows[0]
         self.ports.refused[:] = False
         key = self.state.keys[row]
         return RoomError(
             f"{self._names[int(self.program_numbers()[row])]}: none of {ATTEMPTS} rooms was as `require` asks, in row "
-            f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
+            f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})",
+            rows,
         )
 
 

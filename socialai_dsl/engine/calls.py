@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 
 class RoomError(RuntimeError):
-    """No room that was drawn for an episode is as the scenario's `require` asks."""
+    """No room that was drawn for an episode is as the scenario's `require` asks.
+
+    Attributes:
+        rows: those of the batch in which it is so; in the others all was done.
+    """
+
+    def __init__(self, message: str, rows: Sequence[int] = ()) -> None:
+        super().__init__(message, rows)
+        self.rows = rows
+
+    def __str__(self) -> str:
+        """The message."""
+        return str(self.args[0])
 
 
 TERMINATED = 1
