@@ -66,10 +66,11 @@ CODES: Final[dict[str, str]] = {
     "W314": "something that can never hold",
     "S315": "files of `one_of` that differ where they must not",
     "S316": "no success or no room is possible",
-    "W317": "a definition that nothing uses",
+    "W317": "a definition or frame that nothing uses",
     "S318": "a register that nothing is ever put into",
     "W319": "a condition that always holds",
     "S320": "an action that the agent does not have",
+    "W321": "a gesture or look that is not in the picture",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",
@@ -86,6 +87,7 @@ CODES: Final[dict[str, str]] = {
     "S506": "files that include each other in a circle",
     "S507": "too many or too large included files",
     "S508": "not a scenario name",
+    "W509": "a variant that changes nothing",
     # S6xx: the room
     "S601": "a placement without a free cell",
     "S602": "a place outside of the room",

@@ -306,7 +306,9 @@ class Scripted(NamedTuple):
     loaded: Loaded
 
 
-def closest_script(name: str, loaded: Loaded | None = None) -> Scripted:
+def closest_script(
+    name: str, loaded: Loaded | None = None, texts: Mapping[Path, Source] | None = None
+) -> Scripted:
     """The scenario itself if its agent follows a frame, else its variant `oracle`, if it has one.
 
     Some members of a suite may lack a script even there; `unscripted` names them.
@@ -314,21 +316,47 @@ def closest_script(name: str, loaded: Loaded | None = None) -> Scripted:
     Args:
         name: a path or the name of a shipped scenario, with variants and parameters.
         loaded: the same, where it is loaded already.
+        texts: those that it is loaded with, see `check`.
 
     Raises:
         ScenarioError: the scenario, or its variant, has mistakes.
     """
-    plain = Scripted(name, loaded or load(name))
+    plain = Scripted(name, loaded or load(name, texts))
     if not unscripted(plain.loaded):
         return plain
-    base, mark, parameters = name.partition("?")
-    oracle = f"{base}+oracle{mark}{parameters}"
+    oracle = _oracle_of(name)
     try:
-        return Scripted(oracle, load(oracle))
+        return Scripted(oracle, load(oracle, texts))
     except ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+        if _is_not_there(error):
             return plain
         raise
+
+
+def _oracle_of(name: str) -> str:
+    base, mark, parameters = name.partition("?")
+    return f"{base}+oracle{mark}{parameters}"
+
+
+def _is_not_there(error: ScenarioError) -> bool:
+    """Whether nothing is wrong but that a name does not exist; a member of a suite may have no name of its own."""
+    return all(diagnostic.code in ("S503", "S504", "S508") for diagnostic in error.diagnostics)
+
+
+def _check_claimed_script(
+    name: str, checked: CheckedScenario, texts: Mapping[Path, Source] | None, bag: DiagnosticBag
+) -> None:
+    """Report claims about a script that is not there."""
+    claims = [plan for plan in checked.properties if plan.kind in ("oracle", "script")]
+    if not claims or any(frame.entity == 0 for frame in checked.frames):
+        return
+    try:
+        resolve(_oracle_of(name), texts=texts)
+    except ScenarioError as error:
+        for plan in claims if _is_not_there(error) else ():
+            hint = "give it a variant `oracle` in which the agent follows a frame"
+            message = f"`{plan.kind}` is about the agent's script, and `{checked.name}` has none"
+            bag.warning("S704", message, plan.span, hint=hint)
 
 
 def load_experiment(name: str | Path) -> LoadedExperiment:
@@ -411,6 +439,8 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)
+    if checked is not None:
+        _check_claimed_script(name, checked, texts, bag)
     if every_value and checked is not None:
         bag.extend(of_other_values(resolved))
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))

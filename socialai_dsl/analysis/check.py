@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
 
 from socialai_dsl.analysis.coverage import coverage
 from socialai_dsl.analysis.depth import depth
@@ -13,10 +12,9 @@ from socialai_dsl.analysis.properties import Trial, by_default
 from socialai_dsl.analysis.reports import Evidence, Report
 from socialai_dsl.analysis.scenario_report import ScenarioReport
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, unscripted
-from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.engine.jit import load as load_compiled
 from socialai_dsl.engine.kernel import serve
-from socialai_dsl.frontend import load
+from socialai_dsl.frontend import closest_script, load
 from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.source import Source
 
@@ -110,17 +108,5 @@ def scenarios_of(name: str, texts: Texts = None) -> list[tuple[LoadedScenario, s
 
 def _scripted(loaded: LoadedScenario, called: str, texts: Texts) -> LoadedScenario | None:
     """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
-    if not unscripted(loaded):
-        return loaded
-    base, mark, parameters = called.partition("?")
-    try:
-        scripted = load(f"{base}+oracle{mark}{parameters}", texts)
-    except ScenarioError as error:
-        if any(diagnostic.code not in _UNKNOWN for diagnostic in error.diagnostics):
-            raise
-        return None
+    scripted = closest_script(called, loaded, texts).loaded
     return scripted if isinstance(scripted, LoadedScenario) and not unscripted(scripted) else None
-
-
-_UNKNOWN: Final[frozenset[Any]] = frozenset({"S503", "S504", "S508"})
-"""Codes of names that do not exist; a member of a suite may have no name of its own."""

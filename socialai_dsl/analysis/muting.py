@@ -1,21 +1,31 @@
-"""Programs in which some members of the cast are silent and still, and nothing else differs."""
+"""Programs in which some members of the cast are silent, still and without a face, and nothing else differs."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
 
+from socialai_dsl.analysis.rooms import name_of
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, FramePlan, RulePlan, StatePlan, StepPlan
 
 
 def muted(checked: CheckedScenario, members: Collection[str]) -> CheckedScenario:
-    """The scenario without anything these members do, say or cause.
+    """The scenario without anything these members do, say, cause or show.
 
-    They stand where they would stand at the start. Their frames go on through their states and keep their registers,
-    which others may ask about, but nobody sees or hears anything of it.
+    They stand where they would stand at the start. Their frames go on through their states and keep their registers and
+    looks, which others may ask about, but nobody sees or hears anything of it.
     """
     frames = tuple(_silent(frame) if frame.member in members else frame for frame in checked.frames)
-    return replace(checked, frames=frames)
+    silenced = {
+        one.number
+        for one in checked.entities
+        if one.role == "npc" and name_of(checked, one.number) in members
+    }
+    looks = tuple(
+        replace(look, registers=tuple(one for one in look.registers if one[0] not in silenced))
+        for look in checked.looks
+    )
+    return replace(checked, frames=frames, looks=looks)
 
 
 def _silent(frame: FramePlan) -> FramePlan:

@@ -52,7 +52,9 @@ from socialai_dsl.source import Span
 _HOLDS: Final = "the property holds"
 """Name of the outcome that ends an episode of the copy in which a condition is looked for."""
 
-_AS_TRIED: Final = " (chance during the episode was tried only in part)"
+_AS_TRIED: Final = (
+    " (chance during the episode, if only which way somebody turns round, was tried only in part)"
+)
 _OF_ITSELF: Final = "a success comes of itself, without the agent"
 
 
@@ -261,8 +263,8 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         said = "it rests on nothing: no two rooms look alike at first"
         return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
     said = f"in {held} of {rooms_text(effort.rooms)} the script acts on what it has perceived alone"
-    said += f" ({found.pairs} pairs of rooms that look alike and differ in one draw, {found.groups} groups that differ in "
-    said += "any)"
+    said += f" ({found.pairs} pairs of rooms that look alike and differ in one draw, "
+    said += f"{found.groups} groups that differ in any)"
     for one in (*found.peeks, *found.divisions)[:1]:
         said += f"; {one}"
     share = 1.0 if plan.share is None else plan.share
@@ -356,7 +358,7 @@ def _told(compared: Sequence[TwinComparison], trial: Trial, plan: PropertyPlan, 
 _KNOWN: Final = {
     GuessingVerdict.GUESSES: "{} {} nothing but a guess",
     GuessingVerdict.KNOWS: "in {} it can be known without",
-    GuessingVerdict.TELLS_APART: "in {} something else tells, and more may be made of it",
+    GuessingVerdict.TELLS_APART: "in {} something else tells, so an agent may do without: name that too, or hide it",
     GuessingVerdict.UNDECIDED: "in {} it is undecided",
 }
 _NO_SUCCESS: Final = "no success is possible"

@@ -8,7 +8,7 @@ from typing import Any, Final
 from socialai_dsl.analysis.alone import Alone
 from socialai_dsl.analysis.coverage import Coverage
 from socialai_dsl.analysis.depth import Depth
-from socialai_dsl.analysis.reports import Report
+from socialai_dsl.analysis.reports import Report, rooms_text
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.frontend import not_ignored
 from socialai_dsl.semantics.plans import PropertyPlan
@@ -54,9 +54,11 @@ class ScenarioReport:
             elif report.verdict.value == "undecided":
                 message = f"`{plan.text}` is undecided: {report.said}"
                 yield Diagnostic("W802", message, plan.span, Severity.WARNING, hint)
-        for part in () if self.coverage is None else self.coverage.missing:
-            message = f"the {part.kind} `{part.name}` happens in none of {self.rooms} rooms"
-            yield Diagnostic("W802", message, part.span, Severity.WARNING)
+        if self.coverage is not None:
+            never = _never(self.coverage, rooms_text(self.rooms))
+            for part in self.coverage.missing:
+                message = f"the {part.kind} `{part.name}` {never}"
+                yield Diagnostic("W802", message, part.span, Severity.WARNING)
         if self._is_hopeless and self.outcomes is not None:
             message = f"no success can be reached in any of {self.depth.rooms if self.depth else 0} rooms"
             yield Diagnostic("S801", message, self.outcomes)
@@ -144,10 +146,17 @@ class ScenarioReport:
 def _coverage(found: Coverage, told: Container[Span]) -> Iterator[str]:
     happened = found.parts - len(found.missing)
     yield f"  {happened} of {found.parts} states, steps, rules and outcomes happen in some room"
-    why = "in none of these rooms" if found.proven else "in no room, as far as they were searched"
     for part in found.missing:
         if part.span in told:
-            yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` happens {why}"
+            never = _never(found, "these rooms")
+            yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` {never}"
+
+
+def _never(found: Coverage, rooms: str) -> str:
+    """How sure it is that something never happens in some rooms."""
+    if found.proven:
+        return f"happens in none of {rooms}"
+    return f"was not seen in {rooms}; not all that can be done there was tried"
 
 
 def _depth(found: Depth, rooms: int) -> Iterator[str]:

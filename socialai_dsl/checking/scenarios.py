@@ -16,6 +16,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
+from socialai_dsl.loader.patches import Edit
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
@@ -342,6 +343,7 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
     except ScenarioError as error:
         bag.extend(error.diagnostics)
         return None
+    _report_idle_variants(resolved, bag)
     values, declared = parameter_values(resolved, bag), _declared(resolved)
     whole = resolved.changed(
         lambda tree: put_parameters(tree, values, declared, bag),
@@ -353,6 +355,20 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
     if shaped.model is None or abstract or failed:
         return None
     return Draft(shaped.model, resolved.name, shaped, values, bool(resolved.edits))
+
+
+def _report_idle_variants(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
+    """Report W509 for each file of a variant whose edits all put a value where there is an equal one."""
+    by_file: dict[str, list[Edit]] = {}
+    for edit in resolved.edits:
+        by_file.setdefault(edit.span.file, []).append(edit)
+    for edits in by_file.values():
+        if not any(edit.changes for edit in edits):
+            paths = ", ".join(f"`{edit.path}`" for edit in edits)
+            message = f"this variant changes nothing: {paths} {'is' if len(edits) == 1 else 'are'} so already"
+            bag.warning(
+                "W509", message, edits[0].span, hint="set what is different in it, or delete the file"
+            )
 
 
 def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:

@@ -155,11 +155,13 @@ class Edit:
         verb: what was done.
         path: to which path of the scenario, as written.
         span: where the patch says so.
+        changes: False: it puts a value where there is an equal one.
     """
 
     verb: Literal["remove", "set", "add"]
     path: str
     span: Span
+    changes: bool = True
 
 
 def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
@@ -225,11 +227,12 @@ def _set(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]
     place = _place(root, path, value, found)
     if place is None:
         return []
+    changes = place.node is None or place.node.data != value.data
     if isinstance(place.parent.children, dict):
         place.parent.children[str(place.key)] = value
     elif isinstance(place.parent.children, list):
         place.parent.children[int(place.key)] = value
-    return [Edit("set", path, span)]
+    return [Edit("set", path, span, changes)]
 
 
 def _add(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:

@@ -67,6 +67,7 @@ from socialai_dsl.semantics.terms import (
     Type,
 )
 from socialai_dsl.semantics.texts import texts_in_order
+from socialai_dsl.semantics.unseen import check_unseen
 from socialai_dsl.source import DataPath, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, mark_of, pieces
 from socialai_dsl.vocabulary import words as words_of
@@ -285,6 +286,7 @@ def check_meaning(
                 check_absences(checked, findings, check_placements(checked, findings))
             if checked is not None and not found.has_errors:
                 check_possible(checked, findings)  # else what is missing would seem never to happen
+                check_unseen(checked, scenario.observe.tone, findings)
             break
     bag.extend(_without_consequences(findings, scenario))
     return None if found.has_errors else checked
@@ -517,8 +519,8 @@ class _Run:
                 )
 
     def _report_unused(self) -> None:
-        """Definitions, draws and tables that nothing uses (W317), in a scenario of a single file: those of several
-        may be there for what else is built of these files.
+        """Definitions, draws, tables and frames that nothing uses (W317), in a scenario of a single file: those of
+        several may be there for what else is built of these files.
         """
         places, scenario = self._findings.places, self._scenario
         drawn = [key for key, value in scenario.let.items() if not isinstance(value, Sequence)]
@@ -528,9 +530,17 @@ class _Run:
             *(("define", key) for key in scenario.define),
             *((*path, "define", key) for path, frame in frames_of(scenario) for key in frame.define),
         ]
+        followed = {frame.name for frame in self._played.values()}
+        followed.update(str(role.frame) for role in scenario.roles.values())
+        idle: list[DataPath] = [("frames", key) for key in scenario.frames if key not in followed]
         parts: list[DataPath] = [(name,) for name in scenario.model_fields_set]
-        if len({places.key_span(path).file for path in (*parts, *paths)}) > 1:
+        if len({places.key_span(path).file for path in (*parts, *paths, *idle)}) > 1:
             return
+        for path in idle:
+            hint = f"delete it, or let somebody follow it: `frame: {path[-1]}`"
+            self._findings.warning(
+                "W317", f"nobody follows the frame `{path[-1]}`", places.key_span(path), hint=hint
+            )
         for path in paths:
             if path not in self.resolver.used:
                 name = str(path[-1]).partition("(")[0].strip()

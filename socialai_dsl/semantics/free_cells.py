@@ -115,7 +115,18 @@ class PartialEvaluation:
                 return None if truth is None else int(not truth)
             case terms.Logic(op=op, args=args):
                 return _joined(op == "and", map(self.value, args))
+            case terms.Select():
+                return self._selected(term)
         return None
+
+    def _selected(self, term: terms.Select) -> int | None:
+        for condition, chosen in zip(term.conditions, term.values, strict=True):
+            truth = self.value(condition)
+            if truth is None:
+                return None
+            if truth:
+                return self.value(chosen)
+        return self.value(term.default)
 
 
 # -- rooms of each size: what can be proven ------------------------------------------------------------------
@@ -441,11 +452,20 @@ def check_absences(checked: CheckedScenario, findings: Findings, undecided: Coll
     placings = [item for item in checked.setup if isinstance(item, Placing)]
     asked = [item for item in placings if item.entity in undecided and asks_about_cells(item)]
     told: set[str] = set()
+    drawn: list[Placing] = []
     for placing in placings:
-        if placing.at is not None and (share := _outside(placing.at, checked)):
+        share = None if placing.at is None else _outside(placing.at, checked)
+        if placing.at is not None and share is None:
+            drawn.append(placing)
+        if share:
             _report_outside(checked, findings, placing, share)
             told.add(checked.entities[placing.entity].key)
-    rooms, absences = _tried(checked) if asked else (0, Counter[int]())
+    rooms, absences, outside = _tried(checked) if asked or drawn else (0, Counter[int](), Counter[int]())
+    for placing in drawn if rooms >= _FEWEST else ():
+        key, share = checked.entities[placing.entity].key, outside[placing.entity] / rooms
+        if share and key not in told and (share == 1 or not checked.require):
+            told.add(key)
+            _report_outside(checked, findings, placing, share)
     for placing in asked if rooms >= _FEWEST else ():
         key, absent = checked.entities[placing.entity].key, absences[placing.entity]
         if key in told or not absent:
@@ -460,14 +480,17 @@ def check_absences(checked: CheckedScenario, findings: Findings, undecided: Coll
             findings.warning("W603", message, placing.span, hint=hint)
 
 
-def _outside(at: tuple[Term, Term], checked: CheckedScenario) -> float:
-    """In what share of the sizes of a room a place lies outside of it; 0 if that is drawn."""
+def _outside(at: tuple[Term, Term], checked: CheckedScenario) -> float | None:
+    """In what share of the sizes of a room a place lies outside of it; None if that is drawn."""
     sizes = _sizes(checked)
-    try:
-        spots = [(size, value(at[0], size), value(at[1], size)) for size in sizes]
-    except UnknownError:
-        return 0
-    return sum(not (0 <= x < width and 0 <= y < height) for (width, height), x, y in spots) / len(sizes)
+    found = [_is_outside([PartialEvaluation(size).value(part) for part in at], size) for size in sizes]
+    return None if None in found and not any(found) else sum(map(bool, found)) / len(sizes)
+
+
+def _is_outside(at: Sequence[int | None], size: Size) -> bool | None:
+    """Whether a place lies outside of a room; one coordinate may be enough to know. None: it is not known."""
+    known = [None if one is None else not 0 <= one < side for one, side in zip(at, size, strict=True)]
+    return True if True in known else None if None in known else False
 
 
 def _report_outside(checked: CheckedScenario, findings: Findings, placing: Placing, share: float) -> None:
@@ -505,9 +528,10 @@ def _reads_cell(part: Term) -> bool:
     return isinstance(part, terms.Here) or (isinstance(part, terms.Test) and part.subject is None)
 
 
-def _tried(checked: CheckedScenario) -> tuple[int, Counter[int]]:
-    """How many rooms were drawn, and in how many of them each entity is without a cell."""
-    drawn, absent, generator, left = 0, Counter[int](), Random(0), _EFFORT
+def _tried(checked: CheckedScenario) -> tuple[int, Counter[int], Counter[int]]:
+    """How many rooms were drawn, in how many of them each entity is without a cell, and outside."""
+    drawn, generator, left = 0, Random(0), _EFFORT
+    absent, outside = Counter[int](), Counter[int]()
     sizes = _sizes(checked)
     generator.shuffle(sizes)
     rooms = _ROOMS // len(sizes) * len(sizes) or _ROOMS  # each size equally often
@@ -521,7 +545,8 @@ def _tried(checked: CheckedScenario) -> tuple[int, Counter[int]]:
             break
         drawn += 1
         absent.update(room.absent)
-    return drawn, absent
+        outside.update(room.outside)
+    return drawn, absent, outside
 
 
 _CellsOf = Callable[[Region, Size, bool], frozenset[Cell]]
@@ -548,6 +573,7 @@ class _DrawnRoom(PartialEvaluation):
         self._registers: dict[str, int | None] = {}
         self._taken: set[Cell] = set()
         self.absent: set[int] = set()
+        self.outside: set[int] = set()
         self.effort = 0
 
     def do(self, item: plans.Setup) -> None:
@@ -564,7 +590,9 @@ class _DrawnRoom(PartialEvaluation):
             return
         if placing.at is not None:
             x, y = (self.value(part) for part in placing.at)
-            if x is not None and y is not None:
+            if _is_outside((x, y), self._size):
+                self.outside.add(entity)
+            elif x is not None and y is not None:
                 self._put(entity, (x, y))
             return
         candidates: set[Cell] = set()

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
+from socialai_dsl.analysis.check import check_scenario
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Trial
@@ -240,7 +241,7 @@ def test_which_line_is_said_may_be_what_tells(tried: Trying) -> None:
     nonsense = (frame[0], frame[1].replace(" where d != exit", ""))
     report = tried("{needs: ada}", alone, lines, nonsense)
     assert report.verdict is Verdict.HOLDS
-    assert "chance during the episode was tried only in part" in report.said
+    assert "was tried only in part" in report.said
 
 
 def test_a_script_that_knows_what_it_was_not_told_peeks(tried: Trying) -> None:
@@ -273,3 +274,39 @@ def test_rooms_that_cannot_be_drawn_do_not_count_where_a_script_peeks(tmp_path: 
     assert 0 < len(drawn) < ROOMS
     assert {peek.index for peek in perceived(scripted, ROOMS, 1).peeks} == set(drawn)
     assert perceived(scripted, drawn[0], 1).pairs == 0
+
+
+FACE = """
+scenario: face
+about: After Sorce 1985, cross the ledge where the mother's face is happy.
+horizon: 12
+actions: [left, right, forward]
+grammar: {templates: [Where is <noun>], nouns: [it]}
+room: {size: 7}
+objects:
+  near: {type: box, at: [1, 3]}
+  far: {type: box, at: [5, 3]}
+looks:
+  mood: {for: mother, words: [calm, happy, afraid]}
+let: {safe: pick(0 | 1)}
+frames:
+  watch:
+    states:
+      calm: {then: [{when: t >= 1, set: {mood: happy if safe == 0 else afraid}, goto: shown}]}
+      shown: {}
+cast:
+  mother: {name: Mother, at: [3, 1], facing: down, frame: watch}
+  agent: {at: [3, 5], facing: up}
+outcome:
+  - {success: agent.next_to(near) and safe == 0 or agent.next_to(far) and safe == 1}
+  - {failure: agent.next_to(near) or agent.next_to(far)}
+"""
+
+
+def test_a_silenced_member_has_no_face_either(tmp_path: Path) -> None:
+    """After Sorce (1985): only the mother's face says which side is safe."""
+    (tmp_path / "face.yaml").write_text(FACE + "check:\n  - {needs: mother}\n")
+    loaded = socialai_dsl.load(tmp_path / "face.yaml")
+    assert isinstance(loaded, socialai_dsl.LoadedScenario)
+    (report,) = [found for _, found in check_scenario(loaded, "face", Effort(10)).tried][:1]
+    assert (report.verdict, report.held) == (Verdict.HOLDS, 10)

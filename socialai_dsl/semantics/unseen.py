@@ -1,0 +1,86 @@
+"""Gestures and looks that are outside of the picture's channels, where somebody relies on them or nobody does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, FramePlan, LookPlan
+from socialai_dsl.semantics.scope import Findings
+from socialai_dsl.semantics.terms import FieldOf, Read, SitedTerm, Term, walk
+from socialai_dsl.source import Span
+
+_GESTURES: Final = 4
+"""With more channels than these of the four plain ones the picture shows who points where."""
+
+Reads = Callable[[Term], bool]
+"""Whether a term asks about a gesture or a look."""
+
+
+def check_unseen(checked: CheckedScenario, tone: str | None, findings: Findings) -> None:
+    """Report W321: the agent's own frame goes by what the agent cannot see; or it is shown to nobody.
+
+    Args:
+        checked: the scenario.
+        tone: the look that is heard, if there is one.
+        findings: takes what is found.
+    """
+    if checked.npcs_hidden:
+        return
+    own = tuple(frame for frame in checked.frames if frame.entity == 0)
+    if checked.channels <= _GESTURES:
+        hint = "let the picture show it: `observe: {channels: [type, color, status, orientation, pointing, last_act]}`"
+        made = next(_pointing(checked), None)
+        if (
+            not _relied_on(own, _asks_who_points, "where somebody points", hint, findings)
+            and made is not None
+        ):
+            member, span = made
+            if not _asked_elsewhere(checked, _asks_who_points):
+                message = f"nobody sees where `{member}` points: `channels` has no `pointing`, and nothing asks for it"
+                findings.warning("W321", message, span, hint=hint)
+    for look in checked.looks:
+        if look.shown or look.name == tone:
+            continue
+        asks, hint = _asks_for(look), f"add `{look.name}` to `channels`"
+        if not _relied_on(own, asks, f"the look `{look.name}`", hint, findings) and not _asked_elsewhere(
+            checked, asks
+        ):
+            message = f"nobody sees the look `{look.name}`: `channels` leaves it out, and nothing asks for it"
+            findings.warning("W321", message, findings.places.key_span(("looks", look.name)), hint=hint)
+
+
+def _relied_on(frames: tuple[FramePlan, ...], asks: Reads, what: str, hint: str, findings: Findings) -> bool:
+    """Whether the agent's frame goes by it, which is reported where it does so first."""
+    for frame in frames:
+        for part in ast.walk(frame):
+            if isinstance(part, SitedTerm | Activity) and any(map(asks, walk(part))):
+                message = (
+                    f"`{frame.frame}` goes by {what}, which the agent does not see: `channels` leaves it out"
+                )
+                findings.warning("W321", message, part.span, hint=hint)
+                return True
+    return False
+
+
+def _asked_elsewhere(checked: CheckedScenario, asks: Reads) -> bool:
+    """Whether anything but the agent's own frame asks for it."""
+    others = tuple(frame for frame in checked.frames if frame.entity != 0)
+    parts = (others, checked.rules, checked.outcomes, checked.setup, checked.memories, checked.remembered)
+    return any(any(map(asks, walk(part))) for part in (*parts, checked.require, checked.probes))
+
+
+def _pointing(checked: CheckedScenario) -> Iterator[tuple[str, Span]]:
+    """Members that point, and where that is written."""
+    for frame in checked.frames:
+        yield from ((frame.member, one.span) for one in frame.activities if one.name == "point")
+
+
+def _asks_who_points(term: Term) -> bool:
+    return isinstance(term, FieldOf) and term.name == "pointing"
+
+
+def _asks_for(look: LookPlan) -> Reads:
+    paths = {path for _, path in look.registers}
+    return lambda term: isinstance(term, Read) and term.path in paths
