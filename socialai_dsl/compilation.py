@@ -136,8 +136,8 @@ def _compiled(
     checked: CheckedScenario, notes: NoteTaker, numbered: Lines | None, asking: bool = False
 ) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
-    # So that nothing that claims and probes are about is part of a program.
-    checked = replace(checked, properties=(), probes=checked.probes if asking else ())
+    # So that nothing that claims, tests and probes are about is part of a program.
+    checked = replace(checked, properties=(), tests=(), probes=checked.probes if asking else ())
     allocation = allocate(checked, notes, numbered)
     lowered = lower(allocation)
     program = program_of(allocation, lowered)

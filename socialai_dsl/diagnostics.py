@@ -100,6 +100,8 @@ CODES: Final[dict[str, str]] = {
     # S8xx: what trying it out shows
     "S801": "a claim that does not hold",
     "W802": "something that never happens, or is not decided",
+    "S803": "a test that fails",
+    "S804": "a step of a test after the end of the episode",
 }
 """Code -> one-line title, for every finding the product can make."""
 
@@ -123,6 +125,7 @@ class Diagnostic:
         hint: what to do about it, shown on a line of its own; None where the message says it.
         suggestion: the word that was probably meant, shown as "did you mean `x`?".
         suggestion_place: where that word is, e.g. "let, line 18" or "talkitout.yaml:43".
+        notes: lines that say more, such as why it is so.
     """
 
     code: str
@@ -132,6 +135,7 @@ class Diagnostic:
     hint: str | None = None
     suggestion: str | None = None
     suggestion_place: str | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -339,7 +343,7 @@ _BOLD, _CYAN, _RESET = "\x1b[1m", "\x1b[36m", "\x1b[0m"
 def render_text(
     diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source] | None = None, color: bool = False
 ) -> str:
-    """The findings for a terminal, one block each: the finding, the source line, a caret, the help line.
+    """The findings for a terminal, one block each: the finding, the source line, a caret, notes, the help line.
 
     Args:
         diagnostics: shown in the order given.
@@ -357,6 +361,7 @@ def _render_one(diagnostic: Diagnostic, source: Source | None, color: bool) -> s
     lines = [f"{bold}{place}:{reset} {paint}{diagnostic.code}{reset} {bold}{diagnostic.text}{reset}"]
     if source is not None:
         lines += _snippet(diagnostic.span, source, paint, reset)
+    lines += [f"  {printable(note)}" for note in diagnostic.notes]
     if diagnostic.hint:
         lines.append(f"  {cyan}help:{reset} {printable(diagnostic.hint)}")
     return "\n".join(lines)

@@ -24,6 +24,8 @@ from socialai_dsl.checking.scenarios import (
     of_other_values,
 )
 from socialai_dsl.checking.suites import check_suite
+from socialai_dsl.checking.tests import KIND as TESTS_OF
+from socialai_dsl.checking.tests import Tested, check_tests
 from socialai_dsl.diagnostics import (
     CODES,
     Diagnostic,
@@ -48,6 +50,7 @@ __all__ = [
     "LoadedScenario",
     "LoadedSuite",
     "Scripted",
+    "Tested",
     "check",
     "closest_script",
     "load",
@@ -243,6 +246,7 @@ class CheckResult:
         used: the places of the codes in comments that silenced a warning.
         experiment: the experiment with its conditions, if it is one and nothing is wrong with it.
         curriculum: the curriculum, if it is one and nothing is wrong with it.
+        tested: the scenarios that its tests play, with them; it may be a scenario or a file of tests.
     """
 
     name: str
@@ -255,6 +259,7 @@ class CheckResult:
     used: frozenset[Span] = frozenset()
     experiment: LoadedExperiment | None = None
     curriculum: Curriculum | None = None
+    tested: tuple[Tested, ...] = ()
 
     @property
     def has_errors(self) -> bool:
@@ -283,7 +288,7 @@ def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded
     Raises:
         ScenarioError: with all findings, if one of them is an error.
     """
-    result = check(name, texts)
+    result = check(name, texts, tests=False)
     loaded = None if result.has_errors else _loaded(result)
     return loaded or _refuse(result, "only a scenario or a suite can be run")
 
@@ -396,20 +401,24 @@ def _kind_of(result: CheckResult) -> str:
 
 
 def check(
-    name: str | Path, texts: Mapping[Path, Source] | None = None, every_value: bool = False
+    name: str | Path,
+    texts: Mapping[Path, Source] | None = None,
+    every_value: bool = False,
+    tests: bool = True,
 ) -> CheckResult:
-    """Check a scenario or suite; findings are returned, never raised.
+    """Check a file, or a scenario of a name; findings are returned, never raised.
 
     Args:
         name: a path or the name of a shipped scenario, with variants and parameters.
         texts: resolved path -> text, for files that are not on the disk as they are meant: those of an editor.
         every_value: whether a scenario that is right is also checked with the other values of its parameters.
+        tests: whether the tests in a scenario's file are checked, too.
     """
     with bounded_suggestions():
-        return _check(str(name), texts, every_value)
+        return _check(str(name), texts, every_value, tests)
 
 
-def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) -> CheckResult:
+def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, tests: bool) -> CheckResult:
     try:
         resolved = resolve(name, texts=texts)
     except ScenarioError as error:
@@ -438,19 +447,28 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
             right = None if bag.has_errors else replace(experiment, played=played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
+    if resolved.kind == TESTS_OF:
+        tested = check_tests(resolved, bag)
+        found = tuple(said_once(bag))
+        return _sifted(CheckResult(name, None, None, found, dict(resolved.files), resolved, tested=tested))
     checked, scenario = _checked(resolved, bag)
     if checked is not None:
         _check_claimed_script(name, checked, texts, bag)
     if every_value and checked is not None:
         bag.extend(of_other_values(resolved))
+    # A variant's tests are those that say so (`of`); what a scenario is without it need not be true of it.
+    tested = ()
+    if tests and resolved.kind == "scenario" and resolved.tree.entry("tests") is not None and not resolved.edits:
+        tested = check_tests(resolved, bag)
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
-    return _sifted(CheckResult(name, checked, scenario, found, dict(resolved.files), resolved))
+    result = CheckResult(name, checked, scenario, found, dict(resolved.files), resolved, tested=tested)
+    return _sifted(result)
 
 
 def _sifted(result: CheckResult) -> CheckResult:
     """Without the warnings that comments ignore; a file whose warnings are all known is to have no idle ones."""
     assert result.resolved is not None, "internal: what was checked has been read"
-    meant = any(
+    meant = result.tested or any(
         part is not None for part in (result.checked, result.suite, result.experiment, result.curriculum)
     )
     judged = display_name(result.resolved.path) if meant and not result.has_errors else None

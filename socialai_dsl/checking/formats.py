@@ -130,8 +130,8 @@ def _json(value: Any) -> str:
 
 
 def _with_hint(diagnostic: Diagnostic) -> str:
-    hint = diagnostic.hint
-    return diagnostic.text if hint is None else f"{diagnostic.text}\n{printable(hint)}"
+    more = [*diagnostic.notes, *filter(None, (diagnostic.hint,))]
+    return "\n".join([diagnostic.text, *map(printable, more)])
 
 
 def _escape(text: str, also: str = "") -> str:

@@ -326,18 +326,27 @@ class Draft:
 
 
 def check_scenario(
-    resolved: ResolvedFile, bag: DiagnosticBag
+    resolved: ResolvedFile, bag: DiagnosticBag, tests: Node | None = None
 ) -> tuple[CheckedScenario | None, Scenario | None]:
-    """The meaning of a scenario, and its models; each None if it has mistakes. `bag` takes the findings."""
-    draft = draft_of(resolved, bag)
+    """The meaning of a scenario, and its models; each None if it has mistakes. `bag` takes the findings.
+
+    `tests` are those to read with it, as `draft_of` takes them.
+    """
+    draft = draft_of(resolved, bag, tests)
     if draft is None:
         return None, None
     right_shape = not bag.has_errors
     return meaning_of(draft, bag), draft.scenario if right_shape else None
 
 
-def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
-    """A scenario's models; None if it is abstract or has mistakes that keep its meaning from being looked at."""
+def draft_of(resolved: ResolvedFile, bag: DiagnosticBag, tests: Node | None = None) -> Draft | None:
+    """A scenario's models; None if it is abstract or has mistakes that keep its meaning from being looked at.
+
+    Args:
+        resolved: the scenario; its own tests are left out, so that whoever plays it does not mind them.
+        bag: takes the findings.
+        tests: the tests to read with it, wherever they are written.
+    """
     try:
         resolved = resolved.with_drawn_files()
     except ScenarioError as error:
@@ -346,6 +355,7 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
     _report_idle_variants(resolved, bag)
     values, declared = parameter_values(resolved, bag), _declared(resolved)
     whole = resolved.changed(
+        lambda tree: _put_tests(tree, tests),
         lambda tree: put_parameters(tree, values, declared, bag),
         lambda tree: put_grammar(tree, bag),
         lambda tree: spread(tree, bag),
@@ -369,6 +379,14 @@ def _report_idle_variants(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
             bag.warning(
                 "W509", message, edits[0].span, hint="set what is different in it, or delete the file"
             )
+
+
+def _put_tests(tree: Node, tests: Node | None) -> None:
+    """Put tests in place of the scenario's own."""
+    assert isinstance(tree.children, dict), "internal: a file is a mapping"
+    tree.children.pop("tests", None)
+    if tests is not None:
+        tree.children["tests"] = tests.copy()
 
 
 def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:

@@ -63,7 +63,63 @@ def _called(member: str | None, probe: str) -> str:
     return probe if member is None else f"{member}: {probe}"
 
 
-class Asker(Copied):
+class Companion(Copied):
+    """Plays along with one environment, by programs that note the values its probes are about.
+
+    Args:
+        loaded: the scenario or suite that the environment plays.
+    """
+
+    def __init__(self, loaded: Loaded) -> None:
+        self._playable, self._probes = compile_asking_loaded(loaded)
+        self._table = Table([self._playable], 1)
+        self._lookers = [
+            Looker(program) if probes else None
+            for program, probes in zip(self._table.programs, self._probes, strict=True)
+        ]
+
+    def begin(self, seed: int | None, options: Mapping[str, Any] | None, image: NDArray[np.uint8]) -> None:
+        """Begin the episode that the environment began, as it was asked to.
+
+        Args:
+            seed: as `ScenarioEnv.reset` takes it.
+            options: likewise.
+            image: of the environment's observation.
+        """
+        self._table.reset(seed, options)
+        self._compare(image)
+
+    def follow(self, action: NDArray[np.int64], image: NDArray[np.uint8]) -> None:
+        """Take the environment's step.
+
+        Args:
+            action: int64 (heads,).
+            image: of the environment's observation after it.
+        """
+        self._table.step(Task.STEP_ONLY, action[None])
+        self._compare(image)
+
+    def _compare(self, image: NDArray[np.uint8]) -> None:
+        assert np.array_equal(self._table.image[0], image), "internal: the programs that ask went another way"
+
+    def values(self, begins: bool = False) -> dict[str, str | None]:
+        """What is right now, for each probe; None where something that it is about is not there.
+
+        Args:
+            begins: whether the episode has just begun.
+        """
+        number = self._table.number(0)
+        looker = self._lookers[number]
+        if looker is None:
+            return {}
+        looker.look(self._table.start(0), begins)
+        return {
+            probe.name: looker.right(probe) if looker.is_set(probe.asked) else None
+            for probe in self._probes[number]
+        }
+
+
+class Asker(Companion):
     """Follows the episodes of one environment and says what probes ask.
 
     Attributes:
@@ -74,46 +130,26 @@ class Asker(Copied):
     """
 
     def __init__(self, loaded: Loaded) -> None:
-        playable, self._probes = compile_asking_loaded(loaded)
-        self.sha256 = sha256(f"{playable.sha256} {self._probes}".encode()).hexdigest()
-        self._table = Table([playable], 1)
-        self._lookers = [
-            _Looker(program) if probes else None
-            for program, probes in zip(self._table.programs, self._probes, strict=True)
-        ]
+        super().__init__(loaded)
+        self.sha256 = sha256(f"{self._playable.sha256} {self._probes}".encode()).hexdigest()
         self._asked: set[str] = set()
         self._act = 0
 
     def reset(
         self, seed: int | None, options: Mapping[str, Any] | None, image: NDArray[np.uint8]
     ) -> list[Question]:
-        """Begin the episode that the environment began, as it was asked to; what is asked now.
-
-        Args:
-            seed: as `ScenarioEnv.reset` takes it.
-            options: likewise.
-            image: of the environment's observation.
-        """
-        self._table.reset(seed, options)
+        """Begin the episode that the environment began (see `begin`); what is asked now."""
+        self.begin(seed, options, image)
         self._asked, self._act = set(), self._table.state.keys.item(0, Key.ACT)
-        return self._questions(image, begins=True)
+        return self._questions(begins=True)
 
     def step(self, action: NDArray[np.int64], image: NDArray[np.uint8], ended: bool) -> list[Question]:
-        """Take the environment's step; what is asked now.
+        """Take the environment's step (see `follow`), after which the episode may have ended; what is asked now."""
+        self.follow(action, image)
+        return self._questions(ended=ended)
 
-        Args:
-            action: int64 (heads,).
-            image: of the environment's observation after it.
-            ended: whether the episode has ended.
-        """
-        self._table.step(Task.STEP_ONLY, action[None])
-        return self._questions(image, ended=ended)
-
-    def _questions(
-        self, image: NDArray[np.uint8], begins: bool = False, ended: bool = False
-    ) -> list[Question]:
+    def _questions(self, begins: bool = False, ended: bool = False) -> list[Question]:
         table = self._table
-        assert np.array_equal(table.image[0], image), "internal: the programs that ask went another way"
         if table.state.keys.item(0, Key.ACT) != self._act:
             self._asked, self._act, begins = set(), table.state.keys.item(0, Key.ACT), True
         number = table.number(0)
@@ -137,7 +173,7 @@ class Asker(Copied):
         return questions
 
 
-class _Looker:
+class Looker:
     """Reads what a program notes of a moment, in one step that is then forgotten."""
 
     def __init__(self, program: Program) -> None:
@@ -173,10 +209,14 @@ class _Looker:
         """Whether a register holds something else than 0."""
         return bool(self._registers[name.register])
 
+    def right(self, probe: ProbeNotes) -> str:
+        """The right answer of a probe at the present moment."""
+        return self._text(probe.right)
+
     def question(self, probe: ProbeNotes, called: str) -> Question:
         """The question of a probe at the present moment."""
         answers = {normal(text): text for text in map(self._text, reversed(probe.answers))}
-        right = self._text(probe.right)
+        right = self.right(probe)
         right = answers.setdefault(normal(right), right)
         # Sorted, since in the order written what is right could always stand at the same place.
         in_order = sorted(answers.values(), key=_by_number)

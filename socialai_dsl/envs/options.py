@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,6 +44,43 @@ def reset_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
     known = ("index", "layout", "reset_mask", "test_episode")
     refuse_unknown("reset", {k: v for k, v in options.items() if k not in known}, known)
     return dict(options)
+
+
+def reset_arguments(
+    seed: int = 0,
+    index: int | None = None,
+    test_episode: int | None = None,
+    layout: Path | Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The arguments of `env.reset` for an episode.
+
+    Args:
+        seed: of the rooms.
+        index: which room of the seed, from 0, as `check` and `validate` number them.
+        test_episode: a number of the fixed test set, instead of seed and index.
+        layout: a room to start from, or a JSON file with one (docs/layouts.md).
+
+    Raises:
+        ValueError: these cannot go together, or the file is no JSON.
+        OSError: the file cannot be read.
+    """
+    options: dict[str, Any] = {}
+    if test_episode is not None:
+        if index is not None:
+            raise ValueError(
+                "index: the test set has rooms of its own; leave out the index or the test episode"
+            )
+        options["test_episode"] = test_episode
+    if index is not None:
+        options["index"] = index
+    if isinstance(layout, Path):
+        try:
+            options["layout"] = json.loads(layout.read_text(encoding="utf-8"))
+        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+            raise ValueError(f"layout: {layout} is no JSON: {error}") from None
+    elif layout is not None:
+        options["layout"] = layout
+    return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})
 
 
 def each(what: str, given: Any, count: int, highest: int, or_none: bool = False) -> list[int | None]:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import LoadedSuite
-from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable, ProgramSuite
+from socialai_dsl.source import Node
 from socialai_dsl.widths import REGISTER, UNPINNED
 
 _STEP = re.compile(r"[^.\[\]]+")
@@ -67,15 +68,20 @@ def check_starts(loaded: LoadedSuite, suite: ProgramSuite) -> None:
         try:
             pins_of(program, start.layout)
         except ValueError as error:
-            key, _, message = str(error).partition(": ")
-            place = _place(start.layout, key)
-            unknown = _unknown(message)
-            at = (*start.place, *place) if unknown is None else (*start.place, *place, unknown)
-            if at not in seen:
-                seen.add(at)
-                named = key if key != "layout" else "the layout"
-                found.error("S204", f"{named}: {message}", loaded.resolved.tree.key_span(at))
+            misfit = misfit_of(error, start.layout, loaded.resolved.tree.at(start.place))
+            if misfit.span not in seen:
+                seen.add(misfit.span)
+                found.add(misfit)
     found.raise_errors(loaded.resolved.files)
+
+
+def misfit_of(error: ValueError, layout: Mapping[str, Any], written: Node) -> Diagnostic:
+    """What is wrong with a layout that stands in a file, as S204 at what the error names."""
+    key, _, message = str(error).partition(": ")
+    place, unknown = _place(layout, key), _unknown(message)
+    at = place if unknown is None else (*place, unknown)
+    named = key if key != "layout" else "the layout"
+    return Diagnostic("S204", f"{named}: {message}", written.key_span(at))
 
 
 def _place(layout: Mapping[str, Any], key: str) -> tuple[str | int, ...]:

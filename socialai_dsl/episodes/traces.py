@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import make
-from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.envs.options import reset_arguments
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
@@ -173,34 +173,15 @@ def reset_of(
     test_episode: int | None = None,
     layout: Path | Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """The arguments of `env.reset` for an episode.
-
-    Args:
-        seed: of the rooms.
-        index: which room of the seed, from 0, as `check` and `validate` number them.
-        test_episode: a number of the fixed test set, instead of seed and index.
-        layout: a room to start from, or a JSON file with one (docs/layouts.md).
+    """The arguments of `env.reset` for an episode, see `reset_arguments`.
 
     Raises:
         UsageError: these cannot go together, or the file is no JSON.
     """
-    options: dict[str, Any] = {}
-    if test_episode is not None:
-        if index is not None:
-            raise UsageError(
-                "index: the test set has rooms of its own; leave out the index or the test episode"
-            )
-        options["test_episode"] = test_episode
-    if index is not None:
-        options["index"] = index
-    if isinstance(layout, Path):
-        try:
-            options["layout"] = json.loads(layout.read_text(encoding="utf-8"))
-        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-            raise UsageError(f"layout: {layout} is no JSON: {error}") from None
-    elif layout is not None:
-        options["layout"] = layout
-    return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})
+    try:
+        return reset_arguments(seed, index, test_episode, layout)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 class TracedEpisode:

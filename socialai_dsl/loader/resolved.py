@@ -24,8 +24,11 @@ from socialai_dsl.loader.reader import (
 )
 from socialai_dsl.source import DataPath, Node, Source, Span
 
-KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment", "curriculum")
+KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment", "curriculum", "tests_of")
 """The kinds of file; exactly one of these keys is present."""
+
+TESTS: Final = ".tests.yaml"
+"""The end of the name of a file with tests of the scenario beside it."""
 
 ANY: Final = "any"
 """What a variant that fits every scenario is `of`."""
@@ -304,7 +307,8 @@ def _extended(library: Library, root: Node, kind: str, path: Path, chain: tuple[
         raise library.error("S108", message, entry.value_span())
     assert isinstance(base.tree.children, dict), "internal: a file is a mapping"
     assert isinstance(root.children, dict), "internal: a file is a mapping"
-    base.tree.children.pop("abstract", None)
+    for own in ("abstract", "tests"):  # what a base says of itself alone
+        base.tree.children.pop(own, None)
     del root.children["extends"]
     merged = merge(base.tree, root)
     _check_depth(library, merged)
@@ -459,8 +463,9 @@ def _is_of_any(path: Path) -> bool:
 
 
 def names_in(folder: Path) -> list[str]:
-    """The names of the files in a folder that can stand for themselves, variants of any scenario left out."""
-    return [name.rsplit(".", 1)[0] for name in yaml_files(folder) if not _is_of_any(folder / name)]
+    """The names of the files in a folder that can stand for themselves: no tests, no variants of any scenario."""
+    files = [name for name in yaml_files(folder) if not name.endswith(TESTS)]
+    return [name.rsplit(".", 1)[0] for name in files if not _is_of_any(folder / name)]
 
 
 class ResolvedFile:
@@ -537,6 +542,19 @@ class ResolvedFile:
         if not isinstance(node.value, str):
             raise self.error("S104", "the name of a file is a text", node.value_span())
         return self._named(node.value, node.locate(), _folder(node))
+
+    def continued(self, path: DataPath, base: str) -> ResolvedFile:
+        """The scenario whose name is `base` with the `+variants?parameters` at `path`.
+
+        Raises:
+            ScenarioError: whatever is wrong with the name or the file.
+        """
+        node = self.tree.at(path)
+        text, start = str(node.value), node.locate()
+        if text[:1] not in ("+", "?"):
+            hint = "write what follows the scenario's name: `+variant`, `?parameter=value`, or both"
+            raise self.error("S508", f"`{text}` names no variant and no parameter", start, hint)
+        return self._named(base + text, start.shifted(-len(base)), _folder(node))
 
     def include_key(self, path: DataPath) -> ResolvedFile:
         """The scenario that the key at `path` names, relative to the file that the key stands in.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import Briefing, brief
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.factory import make
-from socialai_dsl.envs.typed import Phrases
+from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage

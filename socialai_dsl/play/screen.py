@@ -16,7 +16,7 @@ from textual.widgets import Input, OptionList, Static
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.calls import RoomError
-from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.envs.view import ahead
 from socialai_dsl.play.game import FinishedEpisode, Game, Sight
 from socialai_dsl.render.canvas import INK

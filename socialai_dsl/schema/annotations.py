@@ -19,10 +19,14 @@ from socialai_dsl.schema.experiment import (
     Settings,
     Transfer,
 )
+from socialai_dsl.schema.files import TestsFile
 from socialai_dsl.schema.scenario import (
     Belief,
     CastMember,
     Character,
+    DialogueRoom,
+    DialogueStep,
+    DialogueTest,
     FirstRule,
     Frame,
     Look,
@@ -80,6 +84,10 @@ CALLED: Final[dict[type, str]] = {
     Property: "a property of `check`",
     OnlyThrough: "`only_through`",
     Probe: "a probe",
+    DialogueTest: "an entry of `tests`",
+    DialogueRoom: "the room of a test",
+    DialogueStep: "a step of a test",
+    TestsFile: "a file of tests",
     Parameter: "a parameter",
     Suite: "a suite",
     Split: "a split",

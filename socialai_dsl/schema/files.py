@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from pydantic import Field, JsonValue
 
 from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
-from socialai_dsl.schema.scenario import Model, Npc, Prose, Scenario
+from socialai_dsl.schema.scenario import DialogueTest, Model, Npc, Prose, Scenario, Word
 from socialai_dsl.schema.suite import Suite
 
 _EXTENDS: Final[Any] = Field(
@@ -61,3 +61,18 @@ class VariantFile(Model):
         default_factory=dict, description="path: value in place of what is there", examples=[{"horizon": 50}]
     )
     add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys that are added")
+
+
+class TestsFile(Model):
+    """Tests of a scenario in a file of their own, `NAME.tests.yaml` beside it."""
+
+    __test__: ClassVar[bool] = False  # pytest takes it for a test
+
+    tests_of: str = Field(
+        min_length=1, description="the scenario's file, with variants and parameters", examples=["talkitout.yaml"]
+    )
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
+    tests: dict[Word, DialogueTest] = Field(
+        min_length=1, description="name: a dialogue that `socialai test` plays"
+    )

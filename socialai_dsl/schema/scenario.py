@@ -11,6 +11,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    JsonValue,
     StringConstraints,
     Tag,
     WithJsonSchema,
@@ -619,6 +620,70 @@ class Probe(Model):
     )
 
 
+# -- tests, which playing never reads ------------------------------------------------------------------------
+
+
+class DialogueRoom(Model):
+    """The room of a test; what is left open is drawn."""
+
+    seed: int | None = Field(
+        None, ge=0, description="the seed of the room; default: one room of each of the seeds 0 to 4, in turn"
+    )
+    index: int | None = Field(None, ge=0, description="which room of the seed, from 0")
+    test_episode: int | None = Field(
+        None, ge=0, description="an episode of the fixed test set, in place of a seed"
+    )
+    layout: str | dict[str, JsonValue] | None = Field(
+        None,
+        description="a known room, in the words of layouts, or the JSON file with one",
+        examples=[{"agent": {"at": [2, 3], "facing": "up"}, "let": {"exit": "doors[1]"}}],
+    )
+
+
+class DialogueStep(Model):
+    """What the agent does, and what must be so then."""
+
+    do: Texts = Field(
+        (),
+        description="an act or several, as typed in `socialai play`; default: nothing is done yet",
+        examples=["Where is the exit", ["forward", "forward How are you"]],
+    )
+    hears: Texts = Field(
+        (),
+        description="all that is heard meanwhile, in order; <...> is a value; `any`: whatever it is; default: nothing",
+        examples=["Gandalf: I am fine."],
+    )
+    state: dict[_Name, StateName] = Field(
+        default_factory=dict,
+        description="member of the cast: the state of its frame after the acts",
+        examples=[{"wizard": "acquainted"}],
+    )
+    true_: Expressions = Field(
+        (), alias="true", description="a condition that holds after the acts, or a list of them"
+    )
+    not_: Expressions = Field(
+        (), alias="not", description="a condition that does not hold after the acts, or a list of them"
+    )
+
+
+class DialogueTest(Model):
+    """A dialogue that must go as written; `socialai test` plays it."""
+
+    about: Prose | None = Field(None, description="one sentence for people")
+    of: str | None = Field(
+        None, description="variants and parameters of the scenario that is played", examples=["+unsocial?n=2"]
+    )
+    room: DialogueRoom = Field(DialogueRoom(), description="the room; default: drawn")
+    play: ListOf[DialogueStep] = Field(min_length=1, max_length=1000, description="what is done, step by step")
+    ends: str | None = Field(
+        None,
+        description="how the last act ends the episode: success, failure, deadly, timeout, an outcome's id, or `open`",
+    )
+    reward: float | None = Field(
+        None, description="what the acts earn together, to three decimals", examples=[0.91]
+    )
+
+
 # -- the file ------------------------------------------------------------------------------------------------
 
 
@@ -762,6 +827,9 @@ class Scenario(Model):
         default_factory=dict,
         max_length=64,
         description="name: a question to language models; playing never reads them",
+    )
+    tests: dict[Word, DialogueTest] = Field(
+        default_factory=dict, description="name: a dialogue that `socialai test` plays; playing never reads them"
     )
 
     def members(self) -> dict[str, CastMember]:

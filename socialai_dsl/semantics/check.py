@@ -22,6 +22,7 @@ from socialai_dsl.semantics import (
     setup,
     tables,
 )
+from socialai_dsl.semantics.dialogues import dialogues
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import PartialEvaluation, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
@@ -381,6 +382,7 @@ class _Run:
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
         asked = probes(resolver)
+        tested = dialogues(resolver, outcomes)
         for one in (*rules, *(one for plan in plans for one in plan.causing)):
             self._look_at_size(one)
         if findings.bag.has_errors:
@@ -441,6 +443,7 @@ class _Run:
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
             probes=asked,
+            tests=tested,
             accepting=accepting,
             readings=resolver.readings,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Self
 
+from socialai_dsl.schema.scenario import DialogueRoom
 from socialai_dsl.semantics.terms import (
     Line,
     ObjectType,
@@ -481,6 +482,67 @@ class ProbePlan:
     remembered: tuple[Drawn, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ClaimPlan:
+    """A condition after a step of a test.
+
+    Attributes:
+        words: as written. expected: whether it is to hold. value: the probe that asks whether it does.
+        members: of the cast, whom it names.
+    """
+
+    words: str
+    expected: bool
+    value: ProbePlan
+    span: Span
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LinePlan:
+    """A line that a test expects: pieces, and the probes that ask for its values."""
+
+    pieces: tuple[str | ProbePlan, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class DialogueStepPlan:
+    """A step of a test.
+
+    Attributes:
+        acts: body action and sentence of each act, None for none. typed: the same as written.
+        hears: all lines; None: whatever is heard.
+        claims: what is so after the acts, or not.
+    """
+
+    span: Span
+    acts: tuple[tuple[str | None, str | None], ...]
+    typed: tuple[str, ...]
+    hears: tuple[LinePlan, ...] | None
+    claims: tuple[ClaimPlan, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DialoguePlan:
+    """An entry of `tests`.
+
+    Attributes:
+        room: where it is played.
+        ends: how the last step ends the episode, and where that is written; None: that does not matter.
+        reward: what all steps earn, likewise.
+        values: the probes of all steps.
+    """
+
+    name: str
+    span: Span
+    room: DialogueRoom
+    steps: tuple[DialogueStepPlan, ...]
+    ends: tuple[str, Span] | None
+    reward: tuple[float, Span] | None
+    values: tuple[ProbePlan, ...]
+
+
 @dataclass(frozen=True)
 class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
@@ -497,8 +559,8 @@ class CheckedScenario:
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
         each_step: millionths added to the reward of every step. channels: of the picture, 4, 6 or 8; one
             more where it `shows_carrying`.
-        properties: what the scenario claims about itself; probes: what language models are asked. No program of the
-            scenario contains either.
+        properties: what the scenario claims about itself; probes: what language models are asked; tests: dialogues, if
+            it was read with them. No program of the scenario contains any of these.
         accepting: members of the cast who do not take everything they are given, each with the path of the register
             that says whether it does.
         readings: how conditions were written; None if it was not made from a file.
@@ -534,6 +596,7 @@ class CheckedScenario:
     looks: tuple[LookPlan, ...] = ()
     properties: tuple[PropertyPlan, ...] = ()
     probes: tuple[ProbePlan, ...] = ()
+    tests: tuple[DialoguePlan, ...] = ()
     accepting: tuple[tuple[int, str], ...] = ()
     readings: Readings | None = field(default=None, compare=False, repr=False)
     addressing: tuple[str, tuple[int, ...]] | None = None

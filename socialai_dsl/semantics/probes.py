@@ -44,6 +44,54 @@ def _plans(resolver: Resolver) -> Iterator[ProbePlan]:
             yield plan
 
 
+class NotedValues:
+    """Reads conditions and texts, and gives each value in them a register of its own.
+
+    Args:
+        resolver: resolves them.
+        name: what their registers begin with.
+        undrawn: why nothing may be drawn in them.
+
+    Attributes:
+        values: those read so far.
+    """
+
+    def __init__(self, resolver: Resolver, name: str, undrawn: str) -> None:
+        self._resolver, self._name, self._why = resolver, name, undrawn
+        self.values: list[Drawn] = []
+
+    def condition(self, path: DataPath, raw: Expression) -> SitedTerm:
+        """The condition at a path, in which nothing is drawn."""
+        return self.undrawn(self._resolver.sited(raw, BOOL, step_scope(path)))
+
+    def text(self, part: str, path: DataPath, raw: str) -> Text:
+        """The pieces of a text and the values in it."""
+        findings, scope = self._resolver.findings, step_scope(path)
+        text = findings.text(path, raw)
+        pieces: list[str | Drawn] = []
+        for piece in parts(self._resolver, text, scope):
+            if isinstance(piece, Term):
+                sited = self.undrawn(SitedTerm(piece, scope.draws.site, findings.at(path)))
+                pieces.append(self.value(f"{part}[{len(pieces)}]", sited))
+            else:
+                pieces.append(piece)
+        return tuple(pieces)
+
+    def value(self, part: str, sited: SitedTerm) -> Drawn:
+        """A value with a register of its own."""
+        type_ = sited.term.type
+        if abs(type_.farthest) > LARGEST_NUMBER:
+            raise self._resolver.findings.too_large(
+                "this", type_.farthest, sited.span, hint="bound it: `min(..., 100)`"
+            )
+        self.values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
+        return self.values[-1]
+
+    def undrawn(self, sited: SitedTerm) -> SitedTerm:
+        """The same, in which nothing is drawn: who asks changes nothing."""
+        return self._resolver.undrawn(sited, self._why)
+
+
 class _Entry:
     """One entry, and where it stands."""
 
@@ -51,12 +99,12 @@ class _Entry:
         self._resolver, self._findings = resolver, resolver.findings
         self._name, self._entry = name, entry
         self._path: DataPath = ("probes", name)
-        self._values: list[Drawn] = []
+        self._noted = NotedValues(resolver, name, "a probe draws nothing itself")
 
     def plan(self) -> ProbePlan:
         """The entry with everything resolved."""
         when, ask, answer, answers = self._parts()
-        own = self._resolver.registers.remembered_in((when, self._values))
+        own = self._resolver.registers.remembered_in((when, self._noted.values))
         span = self._findings.places.key_span(self._path)
         return ProbePlan(self._name, span, when, ask, answer, answers, own)
 
@@ -67,10 +115,11 @@ class _Entry:
         answers: tuple[Text, ...] | None = None
         fine = False
         with surviving():
-            when = None if self._entry.when is None else self._condition(self._entry.when)
+            if self._entry.when is not None:
+                when = self._noted.condition((*self._path, "when"), self._entry.when)
             fine = True
         with surviving():
-            ask = self._text("ask", (*self._path, "ask"), self._entry.ask)
+            ask = self._noted.text("ask", (*self._path, "ask"), self._entry.ask)
         with surviving():
             answer = self._answer()
             answers = tuple(self._answers(answer))
@@ -78,31 +127,14 @@ class _Entry:
             raise FailedError
         return when, ask, answer, answers
 
-    def _condition(self, raw: Expression) -> SitedTerm:
-        return self._undrawn(self._resolver.sited(raw, BOOL, step_scope((*self._path, "when"))))
-
     def _answer(self) -> Drawn:
         """What is right."""
         path = (*self._path, "answer")
         node = self._findings.expression(path, self._entry.answer)
         scope = step_scope(path)
         term = sayable(self._resolver, node, scope, or_condition=True)
-        return self._value(
-            "answer", self._undrawn(SitedTerm(term, scope.draws.site, self._findings.at(path)))
-        )
-
-    def _text(self, part: str, path: DataPath, raw: str) -> Text:
-        """The pieces of a text and the values in it."""
-        text = self._findings.text(path, raw)
-        scope = step_scope(path)
-        pieces: list[str | Drawn] = []
-        for piece in parts(self._resolver, text, scope):
-            if isinstance(piece, Term):
-                sited = self._undrawn(SitedTerm(piece, scope.draws.site, self._findings.at(path)))
-                pieces.append(self._value(f"{part}[{len(pieces)}]", sited))
-            else:
-                pieces.append(piece)
-        return tuple(pieces)
+        sited = SitedTerm(term, scope.draws.site, self._findings.at(path))
+        return self._noted.value("answer", self._noted.undrawn(sited))
 
     def _answers(self, answer: Drawn) -> Iterator[Text]:
         """What can be answered: what is written, else all that the answer can be."""
@@ -116,7 +148,7 @@ class _Entry:
             yield from ((word,) for word in possible)
             return
         places = self._findings.each((*self._path, "answers"), self._entry.answers)
-        written = [self._text(f"answers[{i}]", path, text) for i, (path, text) in enumerate(places)]
+        written = [self._noted.text(f"answers[{i}]", path, text) for i, (path, text) in enumerate(places)]
         self._check_written(written, possible)
         yield from written
 
@@ -160,17 +192,3 @@ class _Entry:
             span = self._findings.at((*self._path, "answers" if self._entry.answers else "answer"))
             message = f"`{self._name}` has only one answer, so nobody is asked"
             self._findings.warning("W404", message, span, hint=_KNOWN_BEFOREHAND)
-
-    def _value(self, part: str, sited: SitedTerm) -> Drawn:
-        """A value with a register of its own."""
-        type_ = sited.term.type
-        if abs(type_.farthest) > LARGEST_NUMBER:
-            raise self._findings.too_large(
-                "this", type_.farthest, sited.span, hint="bound it: `min(..., 100)`"
-            )
-        self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
-        return self._values[-1]
-
-    def _undrawn(self, sited: SitedTerm) -> SitedTerm:
-        """The same, in which nothing is drawn: who asks changes nothing."""
-        return self._resolver.undrawn(sited, "a probe draws nothing itself")

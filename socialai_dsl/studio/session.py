@@ -16,7 +16,7 @@ from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.episodes.policies import Policy, RandomPolicy
 from socialai_dsl.episodes.stage import Stage

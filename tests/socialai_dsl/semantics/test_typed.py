@@ -2,7 +2,7 @@
 
 import pytest
 
-from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.vocabulary import Sentences, Slot
 
 ACTIONS = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
