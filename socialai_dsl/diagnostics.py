@@ -186,13 +186,29 @@ class DiagnosticBag:
         """Add several findings."""
         self._found.update(dict.fromkeys(diagnostics))
 
-    def error(self, code: str, message: str, span: Span, **more: str | None) -> None:
-        """Add an error; `more` has the hint and suggestion of the `Diagnostic`."""
-        self.add(Diagnostic(code, message, span, Severity.ERROR, **more))
+    def error(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        hint: str | None = None,
+        suggestion: str | None = None,
+        suggestion_place: str | None = None,
+    ) -> None:
+        """Add an error, with the attributes of the `Diagnostic`."""
+        self.add(Diagnostic(code, message, span, Severity.ERROR, hint, suggestion, suggestion_place))
 
-    def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
-        """Add a warning; `more` as for an error."""
-        self.add(Diagnostic(code, message, span, Severity.WARNING, **more))
+    def warning(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        hint: str | None = None,
+        suggestion: str | None = None,
+        suggestion_place: str | None = None,
+    ) -> None:
+        """Add a warning, with the attributes of the `Diagnostic`."""
+        self.add(Diagnostic(code, message, span, Severity.WARNING, hint, suggestion, suggestion_place))
 
     @property
     def has_errors(self) -> bool:

@@ -458,7 +458,12 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, te
         bag.extend(of_other_values(resolved))
     # A variant's tests are those that say so (`of`); what a scenario is without it need not be true of it.
     tested = ()
-    if tests and resolved.kind == "scenario" and resolved.tree.entry("tests") is not None and not resolved.edits:
+    if (
+        tests
+        and resolved.kind == "scenario"
+        and resolved.tree.entry("tests") is not None
+        and not resolved.edits
+    ):
         tested = check_tests(resolved, bag)
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
     result = CheckResult(name, checked, scenario, found, dict(resolved.files), resolved, tested=tested)

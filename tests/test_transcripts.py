@@ -1,4 +1,5 @@
-"""Dialogues as they read: what the agent does and says, what it hears, how it ends. One file for each point.
+"""Dialogues in suites as they read: what the agent does and says, what it hears, how it ends. Those of scenarios are
+tests in the files beside them, see `test_dialogues.py`.
 
 `> [body action][, say SENTENCE]` is a step, `< LINE` what is heard in it, `= success|failure|timeout REWARD` its
 end; a step without `<` is silent, one without `=` ends nothing. The header is `scenario:` and a `layout:` in JSON,
@@ -17,17 +18,6 @@ from tests.scenarios.playing import made
 
 FOLDER = Path(__file__).parent / "transcripts"
 FILES = sorted(FOLDER.glob("*.txt"))
-PAPER = [
-    "talkitout",
-    "talkitout_no_liar",
-    "dance",
-    "cointhief",
-    "diverse_exit",
-    "showme",
-    "showme_no_social",
-    "help",
-    "help_as_helper",
-]
 
 
 @dataclass
@@ -74,24 +64,3 @@ def test_transcript(path: Path) -> None:
                 word = "timeout" if truncated else "success" if info["success"] else "failure"
                 ended = f"{word} {reward:g}"
             assert ended == turn.end, where
-
-
-def test_every_scenario_of_the_paper_has_transcripts_of_a_success_and_of_something_else() -> None:
-    ends: dict[str, set[str]] = {}
-    for path in FILES:
-        name, _, turns = read(path)
-        ends.setdefault(name.partition("+")[0], set()).add((turns[-1].end or "none").split()[0])
-    for name in PAPER:
-        assert "success" in ends[name], name
-        assert ends[name] - {"success"}, name
-
-
-@pytest.mark.parametrize("number", range(12))
-def test_every_teacher_has_a_right_and_a_wrong_introduction(number: int) -> None:
-    heard = {}
-    for how in ("right", "wrong"):
-        _, layout, turns = read(FOLDER / f"diverse_exit_{number:02}_{how}.txt")
-        assert layout["one_of"] == {"teacher": f"teacher_{number:02}"}
-        heard[how] = {line for turn in turns for line in turn.heard}
-    assert len(heard["right"]) == 1
-    assert heard["wrong"] == set()

@@ -68,7 +68,9 @@ def _checked(name: str, stdin_name: str) -> tuple[str, CheckResult]:
 
 
 def _misfits(result: CheckResult) -> Iterator[Diagnostic]:
-    """What is wrong with the layouts of a suite, which only its compiled scenarios can tell."""
+    """What only compiled scenarios can tell: layouts of a suite or of tests that do not fit, acts after the end."""
+    if result.tested and not result.has_errors:
+        yield from _rehearsed(result, judged=False)
     if result.suite is None or not any(result.suite.starts):
         return
     # Other files are checked without NumPy, Numba and Gymnasium.
@@ -81,8 +83,19 @@ def _misfits(result: CheckResult) -> Iterator[Diagnostic]:
         yield from error.diagnostics
 
 
+def _rehearsed(result: CheckResult, judged: bool) -> Iterator[Diagnostic]:
+    """What is wrong with tests when they are played; only if they are `judged`, what is heard and so on counts."""
+    from socialai_dsl.envs.dialogues import Rehearsal
+
+    for one in result.tested:
+        rehearsal = Rehearsal(one)
+        for plan in one.loaded.checked.tests:
+            yield from rehearsal.play(plan, judged)
+
+
 def _tried(result: CheckResult, effort: Callable[[], Effort], say: Say | None) -> Iterator[Diagnostic]:
-    """What trying the scenario of a file out shows, or the members of a suite."""
+    """What trying the scenario of a file out shows, or the members of a suite, and its tests."""
+    yield from _rehearsed(result, judged=True)
     if result.checked is None and result.suite is None:
         return
     from socialai_dsl.analysis.check import check_scenario, compile_engine, scenarios_of

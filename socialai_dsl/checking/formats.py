@@ -93,15 +93,15 @@ def as_sarif(checked: Sequence[CheckedInput]) -> str:
     return _json(log)
 
 
-def as_junit(checked: Sequence[CheckedInput]) -> str:
-    """A JUnit XML file: one test case per checked file; warnings are its output, errors its failures."""
+def as_junit(checked: Sequence[CheckedInput], command: str = "validate") -> str:
+    """A JUnit XML file: one test case per checked input; warnings are its output, errors its failures."""
     failed = sum(c.errors > 0 for c in checked)
     suite = ElementTree.Element(
-        "testsuite", name="socialai validate", tests=str(len(checked)), failures=str(failed)
+        "testsuite", name=f"socialai {command}", tests=str(len(checked)), failures=str(failed)
     )
     for c in checked:
         case = ElementTree.SubElement(
-            suite, "testcase", classname="socialai.validate", name=printable(c.name)
+            suite, "testcase", classname=f"socialai.{command}", name=printable(c.name)
         )
         if c.errors:
             failure = ElementTree.SubElement(case, "failure", message=counted(c.errors, "error"))

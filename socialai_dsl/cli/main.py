@@ -25,7 +25,7 @@ _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""
 
 _GROUPS: Final = {
-    "write scenarios": ("new", "list", "validate", "check", "explain", "show", "fmt"),
+    "write scenarios": ("new", "list", "validate", "test", "check", "explain", "show", "fmt"),
     "see them played": ("play", "trace", "replay", "studio"),
     "train and evaluate agents": ("run", "evaluate", "export", "serve"),
     "many runs": ("experiment", "report"),

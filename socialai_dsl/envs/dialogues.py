@@ -106,7 +106,8 @@ class _Performance:
         except (RoomError, OSError) as error:
             yield self._finding("S803", f"there is no such room: {error}", self._room.key_span(), ())
             return
-        for self._step, step in enumerate(self._plan.steps, 1):
+        for step in self._plan.steps:
+            self._step += 1
             heard: list[str] = []
             for number, act in enumerate(step.acts):
                 if self._end is not None:
@@ -264,7 +265,9 @@ class _Performance:
             words += ["--index", str(room.index)]
         layout = self._layout()
         if layout is not None:
-            shown = display_name(layout) if isinstance(layout, Path) else json.dumps(layout, ensure_ascii=False)
+            shown = (
+                display_name(layout) if isinstance(layout, Path) else json.dumps(layout, ensure_ascii=False)
+            )
             words += ["--layout", shown]
         return shlex.join([*words, *(word for typed in self._done for word in ("--do", typed))])
 

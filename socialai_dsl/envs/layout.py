@@ -380,7 +380,9 @@ class _Layout:
             self.row[self.addresses.filled[key].register] = len(held)
 
     def _act(self, acts: ActRegisters, k: int, given: Any, key: str) -> None:
-        """An element of a sequence or memory: [move, utterance], where None is silence."""
+        """An element of a sequence or memory: [move, utterance], where None is silence, or the move alone."""
+        if isinstance(given, str):
+            given = (given, None)
         move, said = parts_of(key, given, 2, "[move, utterance]")
         if move is not None:
             self._pin(acts.moves[k], move, f"{key}[0]")

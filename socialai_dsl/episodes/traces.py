@@ -16,7 +16,6 @@ from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.options import reset_arguments
-from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
@@ -24,6 +23,7 @@ from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.traces.document import Outcome, Thought, Trace
 from socialai_dsl.traces.endings import endings_of
 from socialai_dsl.traces.state import cast_of

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.loader.reader import read_document, shipped_folder
+from socialai_dsl.loader.resolved import TESTS
 from socialai_dsl.vocabulary import spelt
 
 IDS: Final = {
@@ -58,9 +59,9 @@ def catalogue() -> list[ShippedScenario]:
 
 @cache
 def _documents() -> dict[str, dict[str, Any]]:
-    """Name (path in the folder of shipped scenarios, without its suffix) -> top level of each file."""
+    """Name (path in the folder of shipped scenarios, without its suffix) -> top level of each file; no tests."""
     folder = shipped_folder()
-    files = sorted(folder.rglob("*.yaml"))
+    files = sorted(path for path in folder.rglob("*.yaml") if not path.name.endswith(TESTS))
     read = {path.relative_to(folder).with_suffix("").as_posix(): read_document(path).data for path in files}
     return {name: content for name, content in read.items() if isinstance(content, dict)}
 

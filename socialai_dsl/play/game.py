@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import Briefing, brief
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.factory import make
-from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage
@@ -20,6 +19,7 @@ from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.program_suite import Playable, outcome_name
 from socialai_dsl.render.panel import DialogueLine
+from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.traces.endings import Ending, endings_of
 from socialai_dsl.traces.state import cast_of, present
 from socialai_dsl.traces.steps import describe_step

@@ -16,12 +16,12 @@ from textual.widgets import Input, OptionList, Static
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.calls import RoomError
-from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.envs.view import ahead
 from socialai_dsl.play.game import FinishedEpisode, Game, Sight
 from socialai_dsl.render.canvas import INK
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.render.tiles import PALETTE
+from socialai_dsl.semantics.typed import Phrases, split_line
 
 Episodes = Callable[[int], tuple[str, dict[str, Any]] | None]
 """Number, counted from 0 -> title and arguments of `env.reset`; None after the last one."""

@@ -69,7 +69,9 @@ class TestsFile(Model):
     __test__: ClassVar[bool] = False  # pytest takes it for a test
 
     tests_of: str = Field(
-        min_length=1, description="the scenario's file, with variants and parameters", examples=["talkitout.yaml"]
+        min_length=1,
+        description="the scenario's file, with variants and parameters",
+        examples=["talkitout.yaml"],
     )
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")

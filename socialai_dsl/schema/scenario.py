@@ -674,7 +674,9 @@ class DialogueTest(Model):
         None, description="variants and parameters of the scenario that is played", examples=["+unsocial?n=2"]
     )
     room: DialogueRoom = Field(DialogueRoom(), description="the room; default: drawn")
-    play: ListOf[DialogueStep] = Field(min_length=1, max_length=1000, description="what is done, step by step")
+    play: ListOf[DialogueStep] = Field(
+        min_length=1, max_length=1000, description="what is done, step by step"
+    )
     ends: str | None = Field(
         None,
         description="how the last act ends the episode: success, failure, deadly, timeout, an outcome's id, or `open`",
@@ -829,7 +831,8 @@ class Scenario(Model):
         description="name: a question to language models; playing never reads them",
     )
     tests: dict[Word, DialogueTest] = Field(
-        default_factory=dict, description="name: a dialogue that `socialai test` plays; playing never reads them"
+        default_factory=dict,
+        description="name: a dialogue that `socialai test` plays; playing never reads them",
     )
 
     def members(self) -> dict[str, CastMember]:

@@ -145,25 +145,26 @@ class _Test:
         action, said = split_line(typed, PRIMITIVES)
         if action is not None and action not in actions:
             message = f"the agent of this scenario has no action `{action}`"
-            hint = f"it has {', '.join(actions)}"
-            raise self._findings.fail("S320", message, self._findings.at(path, width=len(action)), hint=hint)
+            place = self._findings.at(path, width=len(action))
+            raise self._findings.fail("S320", message, place, hint=f"it has {', '.join(actions)}")
         if said is None or normal(said) in sayable:
             return action, None if said is None else sayable[normal(said)]
         near = Phrases(actions, self._resolver.symbols.sentences).corrected(typed)
+        hint: str | None = f"movements are {', '.join((*actions, *STANDING))}"
         span = self._findings.at(path, width=len(typed))
         if action is not None or typed[:1].isupper() or typed.split(" ")[0] in STANDING:
             message = f'the agent cannot say "{said}" with this grammar'
             hint = None if near else "what can be said is a template of `grammar` with one of its nouns"
             raise self._findings.fail("S401", message, span, suggestion=near, hint=hint)
-        hint = None if near else f"movements are {', '.join((*actions, *STANDING))}"
-        raise self._findings.fail("S205", f"`{typed}` can be neither done nor said", span, suggestion=near, hint=hint)
+        message = f"`{typed}` can be neither done nor said"
+        raise self._findings.fail("S205", message, span, suggestion=near, hint=None if near else hint)
 
     def _lines(self, path: DataPath, step: DialogueStep, noted: NotedValues) -> Iterator[LinePlan]:
         for i, (place, raw) in enumerate(self._findings.each((*path, "hears"), step.hears)):
             with self._surviving():
                 pieces = noted.text(f"hears{i}", place, raw)
                 read = tuple(piece if isinstance(piece, str) else self._probe(piece) for piece in pieces)
-                yield LinePlan(read, self._findings.at(place))
+                yield LinePlan(read, self._findings.at(place, width=len(raw)))
 
     def _states(self, path: DataPath, step: DialogueStep, noted: NotedValues) -> Iterator[ClaimPlan]:
         """That members are in states, as `wizard.is(acquainted)` says it."""
@@ -185,14 +186,18 @@ class _Test:
         near = did_you_mean(member, known)
         hint = None if near else f"members with states are {', '.join(known) or 'none'}"
         span = self._findings.places.key_span(path)
-        raise self._findings.no_such(member, f"`{member}` is no member of the cast", span, suggestion=near, hint=hint)
+        raise self._findings.no_such(
+            member, f"`{member}` is no member of the cast", span, suggestion=near, hint=hint
+        )
 
     def _claim(
         self, part: str, path: DataPath, raw: Expression, expected: bool, noted: NotedValues
     ) -> ClaimPlan:
         condition = noted.condition(path, raw)
         symbols = self._resolver.symbols
-        named = (part.id for part in self._findings.expression(path, raw).walk() if isinstance(part, ast.Name))
+        named = (
+            part.id for part in self._findings.expression(path, raw).walk() if isinstance(part, ast.Name)
+        )
         members = [m for name in named for m in symbols.groups.get(name, (name,)) if m in symbols.cast]
         probe = self._probe(noted.value(part, condition))
         words = " ".join(str(raw).split())
@@ -204,4 +209,3 @@ class _Test:
         remembered = self._resolver.registers.remembered_in(value)
         self._probes.append(ProbePlan(name, value.value.span, None, (), value, (), remembered))
         return self._probes[-1]
-

@@ -16,7 +16,6 @@ from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.episodes.policies import Policy, RandomPolicy
 from socialai_dsl.episodes.stage import Stage
@@ -25,6 +24,7 @@ from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
+from socialai_dsl.semantics.typed import Phrases, split_line
 from socialai_dsl.source import Source
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
 from socialai_dsl.traces import Thought, Tracer

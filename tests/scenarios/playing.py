@@ -21,7 +21,7 @@ NOVEL = tuple(
     sorted(
         path.stem
         for path in (Path(__file__).parents[2] / "scenarios/novel").glob("*.yaml")
-        if not path.stem.endswith("_oracle")
+        if not path.stem.endswith(("_oracle", ".tests"))
     )
 )
 """The scenarios beyond the paper and the School."""

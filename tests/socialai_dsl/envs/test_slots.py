@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.llm.actions import ActionLanguage, ToolCall
 from socialai_dsl.program_suite import mixture
+from socialai_dsl.semantics.typed import Phrases
 
 ERRANDS = """
 scenario: errands
