@@ -25,7 +25,7 @@ from socialai_dsl.checking.scenarios import (
 )
 from socialai_dsl.checking.suites import check_suite
 from socialai_dsl.checking.tests import KIND as TESTS_OF
-from socialai_dsl.checking.tests import Tested, check_tests
+from socialai_dsl.checking.tests import Tested, check_tests, tested_by
 from socialai_dsl.diagnostics import (
     CODES,
     Diagnostic,
@@ -260,6 +260,13 @@ class CheckResult:
     experiment: LoadedExperiment | None = None
     curriculum: Curriculum | None = None
     tested: tuple[Tested, ...] = ()
+
+    @property
+    def whole(self) -> ResolvedFile | None:
+        """What the expressions in it are about: of a file of tests the scenario, else `resolved`."""
+        if self.resolved is None or self.resolved.kind != TESTS_OF:
+            return self.resolved
+        return tested_by(self.resolved)
 
     @property
     def has_errors(self) -> bool:

@@ -99,7 +99,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "evaluation": (
         TEXT_SIDE
         | {"errors", "atomic", "baselines", "model_options"}
-        | {"program", "program_suite", "compilation", "envs", "analysis"}
+        | {"authoring", "program", "program_suite", "compilation", "envs", "analysis"}
         | {"episodes", "traces", "llm", "play", "experiments", "runs.folder", "runs.versions"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),

@@ -41,8 +41,9 @@ def validate(
     checked = []
     for name, result in results:
         found = [d for d in result.diagnostics if d.code != UNUSED or d.span not in used]
-        if effort is not None and not result.has_errors:
-            found += _tried(result, effort, say)
+        if not result.has_errors:
+            found += _rehearsed(result, judged=effort is not None)
+            found += _tried(result, effort, say) if effort is not None else ()
         checked.append(CheckedInput(name, tuple(found), result.sources))
     return checked
 
@@ -68,9 +69,7 @@ def _checked(name: str, stdin_name: str) -> tuple[str, CheckResult]:
 
 
 def _misfits(result: CheckResult) -> Iterator[Diagnostic]:
-    """What only compiled scenarios can tell: layouts of a suite or of tests that do not fit, acts after the end."""
-    if result.tested and not result.has_errors:
-        yield from _rehearsed(result, judged=False)
+    """What is wrong with the layouts of a suite, which only its compiled scenarios can tell."""
     if result.suite is None or not any(result.suite.starts):
         return
     # Other files are checked without NumPy, Numba and Gymnasium.
@@ -84,7 +83,11 @@ def _misfits(result: CheckResult) -> Iterator[Diagnostic]:
 
 
 def _rehearsed(result: CheckResult, judged: bool) -> Iterator[Diagnostic]:
-    """What is wrong with tests when they are played; only if they are `judged`, what is heard and so on counts."""
+    """What is wrong with tests when they are played: rooms that cannot be, acts after the end; if they are `judged`,
+    what they expect as well.
+    """
+    if not result.tested:
+        return  # other files are checked without NumPy, Numba and Gymnasium
     from socialai_dsl.envs.dialogues import Rehearsal
 
     for one in result.tested:
@@ -94,8 +97,7 @@ def _rehearsed(result: CheckResult, judged: bool) -> Iterator[Diagnostic]:
 
 
 def _tried(result: CheckResult, effort: Callable[[], Effort], say: Say | None) -> Iterator[Diagnostic]:
-    """What trying the scenario of a file out shows, or the members of a suite, and its tests."""
-    yield from _rehearsed(result, judged=True)
+    """What trying the scenario of a file out shows, or the members of a suite."""
     if result.checked is None and result.suite is None:
         return
     from socialai_dsl.analysis.check import check_scenario, compile_engine, scenarios_of

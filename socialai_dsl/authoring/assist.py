@@ -11,12 +11,13 @@ from pydantic import BaseModel
 
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
 from socialai_dsl.authoring.language_schema import FILES
-from socialai_dsl.authoring.names import Name, frame_of, last_key, meant, part_at, visible
+from socialai_dsl.authoring.names import Name, declared, frame_of, last_key, meant, part_at, visible
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, holds_expressions, literals, model_at
 from socialai_dsl.schema.files import ScenarioFile
 from socialai_dsl.schema.scenario import CastGroup
+from socialai_dsl.semantics.dialogues import ENDS
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
     EFFECTS,
@@ -26,14 +27,17 @@ from socialai_dsl.semantics.signatures import (
     VALUES,
     Signature,
 )
+from socialai_dsl.semantics.typed import STANDING
 from socialai_dsl.source import Data, DataPath, Node
+from socialai_dsl.vocabulary import PRIMITIVES
 
 _TEXTS: Final = ("say", "ask", "answers")
 """Keys whose values are texts with values in them."""
 _PROSE: Final = ("about", "notes", "skills")
 """Keys whose values are texts for people."""
 
-_NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
+_NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario", "tests_of")
+_TEXTS_OF_TESTS: Final = ("do", "hears", "of", "ends")
 _WORDS: Final = {
     "agent": "the agent, whom a policy plays",
     "self": "the NPC that follows the frame",
@@ -115,12 +119,22 @@ def _signatures(cursor: Cursor) -> Iterable[Signature]:
     table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
     return (
         ()
-        if cursor.is_key or _is_prose(cursor.path) or (key in _TEXTS and "<" not in cursor.before)
+        if cursor.is_key or _is_prose(cursor.path) or (_is_text(cursor.path) and "<" not in cursor.before)
         else (
             *table.values(),
             *(s for s in SIGNATURES if s.name not in table),
         )
     )
+
+
+def _is_in_test(path: DataPath) -> bool:
+    return path[:1] == ("tests",)
+
+
+def _is_text(path: DataPath) -> bool:
+    """Whether a text stands there, in which only values are expressions."""
+    key = last_key(path)
+    return key in _TEXTS or (_is_in_test(path) and key in _TEXTS_OF_TESTS)
 
 
 def _is_prose(path: DataPath) -> bool:
@@ -200,7 +214,7 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
         yield from _keys(cursor, cursor.path, data)
         words = literals(annotation_at(root, cursor.path)) if root is not None else []
         yield from (Offer(str(word), "word", "") for word in words)
-    if key in _NAMING_FILES and folder is not None and len(cursor.path) <= 4:
+    if key in _NAMING_FILES and folder is not None and len(cursor.path) <= 4 and not _is_in_test(cursor.path):
         yield from (Offer(name, "file", "a file beside this one") for name in yaml_files(folder))
     elif cursor.word.startswith("$"):
         names = meant(data, cursor.path, False, "$")
@@ -209,11 +223,18 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
         yield from (Offer(name, "word", "an object type") for name in prelude().types)
     elif key == "grammar":
         yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
-    elif key == "hears":
+    elif _is_in_test(cursor.path) and key == "do":
+        yield from (Offer(word, "word", "a movement") for word in (*PRIMITIVES, *STANDING[1:]))
         yield from _utterances(data)
-    elif _is_prose(cursor.path) or (key in _TEXTS and cursor.before.rpartition("<")[2].count(">") != 0):
+    elif _is_in_test(cursor.path) and key == "ends":
+        yield from (Offer(word, "word", "how an episode ends") for word in (*ENDS, *_ids(data)))
+    elif key == "hears" and not _is_in_test(cursor.path):
+        yield from _utterances(data)
+    elif _is_prose(cursor.path) or (
+        _is_text(cursor.path) and cursor.before.rpartition("<")[2].count(">") != 0
+    ):
         return
-    elif key not in _TEXTS or "<" in cursor.before:
+    elif not _is_text(cursor.path) or "<" in cursor.before:
         yield from _in_expression(cursor, data, key, root)
 
 
@@ -222,6 +243,10 @@ def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
     if cursor.is_key and path[:1] == ("cast",) and path[2:] == ("with",):
         names = meant(data, (*path, ""), True, "")
         yield from (Offer(name.word, "key", name.kind) for name in names)
+        return
+    if cursor.is_key and _is_in_test(path) and path[-1:] == ("state",):
+        members = declared(data, ("cast",), "a member of the cast")
+        yield from (Offer(name.word, "key", name.kind) for name in members)
         return
     given = part_at(cursor.data, path)
     model = _model_of(cursor.data, path)
@@ -296,6 +321,13 @@ def _utterances(data: Data) -> Iterator[Offer]:
                     yield Offer(
                         str(template).replace(f"<{name}>", str(word)), "word", "what the agent can say"
                     )
+
+
+def _ids(data: Data) -> list[str]:
+    """The names of the outcomes that have one."""
+    outcomes = part_at(data, ("outcome",))
+    listed = outcomes if isinstance(outcomes, list) else []
+    return [str(one["id"]) for one in listed if isinstance(one, dict) and "id" in one]
 
 
 def _root(data: Data) -> type[BaseModel] | None:

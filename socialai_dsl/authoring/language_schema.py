@@ -22,6 +22,7 @@ from socialai_dsl.schema.files import (
     NpcFile,
     ScenarioFile,
     SuiteFile,
+    TestsFile,
     VariantFile,
 )
 
@@ -37,6 +38,7 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
     "library": (ObjectLibrary, GrammarLibrary),
     "experiment": (ExperimentFile,),
     "curriculum": (CurriculumFile,),
+    "tests_of": (TestsFile,),
 }
 """The key that says the kind of a file -> the models of such files."""
 
@@ -114,7 +116,7 @@ class _Definitions:
             return {"properties": {"library": {"enum": words}}, "allOf": chosen}
         (model,) = files
         whole = self._reference(model.__name__, parameters, False)
-        if kind == "variant":
+        if "extends" not in model.model_fields:
             return whole
         builds: list[Schema] = [{"required": ["extends"]}]
         if "abstract" in model.model_fields:

@@ -110,6 +110,9 @@ def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
             frame = frame_of(data, str(path[1]))
             return declared(data, ("frames", frame, "slots"), f"a slot of `{frame}`") if frame else []
         return []
+    if path[:1] == ("tests",) and path[-2:-1] == ("state",):
+        frame = frame_of(data, str(path[-1]).partition("[")[0])
+        return states(data, frame) if frame else []
     if path[:1] == ("frames",) and (key in ("goto", "goto_now") or path[2:] == ("start",)):
         return states(data, str(path[1]))
     if key == "frame":

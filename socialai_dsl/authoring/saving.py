@@ -14,9 +14,7 @@ from socialai_dsl.loader.reader import Plain, read_document, read_plain
 from socialai_dsl.source import Node, Source
 
 _WIDTH: Final = 100
-_WHOLE: Final[dict[str, bool]] = {"break_long_words": False, "break_on_hyphens": False}
-"""How lines are folded."""
-_PLAIN: Final = re.compile(r"[A-Za-z+][A-Za-z0-9_<>.'()=!+/-]*( [A-Za-z0-9_<>.'()=!+/-]+)*")
+_PLAIN: Final = re.compile(r"(?:[A-Za-z+]|\?(?=\w))[A-Za-z0-9_<>.'()=!+/-]*( [A-Za-z0-9_<>.'()=!+/-]+)*")
 """What needs no quotes anywhere."""
 _ALONE: Final = re.compile(r"[A-Za-z](?:[^:#]|[:#](?=\w))*(?<! )")
 """What needs none as the value of a key in a line of its own."""
@@ -100,14 +98,25 @@ def _block(mapping: Mapping[str, Any], indent: int) -> list[str]:
         elif isinstance(value, Sequence) and not isinstance(value, str):
             begun = f"{' ' * indent}{key}: ["
             listed = ", ".join(map(_flow, value))
-            lines += textwrap.wrap(f"{begun}{listed}]", _WIDTH, subsequent_indent=" " * len(begun), **_WHOLE)
+            lines += _folded(f"{begun}{listed}]", "", " " * len(begun))
         elif isinstance(value, str):
             lines.append(f"{' ' * indent}{key}: >-")
             deeper = " " * (indent + 2)
-            lines += textwrap.wrap(value, _WIDTH, initial_indent=deeper, subsequent_indent=deeper, **_WHOLE)
+            lines += _folded(value, deeper, deeper)
         else:
             lines.append(line)
     return lines
+
+
+def _folded(text: str, first: str, others: str) -> list[str]:
+    return textwrap.wrap(
+        text,
+        _WIDTH,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _item(mapping: Mapping[str, Any], indent: int) -> list[str]:

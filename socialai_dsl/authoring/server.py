@@ -58,8 +58,8 @@ class Server(LanguageServer):
         path = path_of(uri)
         texts = {path_of(other): self.source(other) for other in self.workspace.text_documents}
         result = frontend.check(path, texts)
-        if result.resolved is not None:
-            self._resolved[uri] = result.resolved
+        if (whole := result.whole) is not None:
+            self._resolved[uri] = whole
         return [self._finding(uri, d, display_name(path)) for d in result.diagnostics]
 
     def _finding(self, uri: str, found: Diagnostic, own: str) -> lsp.Diagnostic:
@@ -90,7 +90,7 @@ class Server(LanguageServer):
             return None
 
     def resolved(self, uri: str) -> ResolvedFile | None:
-        """The file with everything it builds on, as it last could be read."""
+        """The file with everything it builds on, or the scenario of a file of tests, as it last could be read."""
         return self._resolved.get(uri)
 
     def place(self, uri: str, position: lsp.Position) -> tuple[int, int]:

@@ -52,7 +52,8 @@ def write_template(template: str, name: str) -> list[Path]:
 def template_files(template: str, name: str) -> dict[Path, str]:
     """Path -> text, for the files of a template under the name of a scenario; the scenario itself first."""
     modeline = f"# yaml-language-server: $schema={SCHEMA}\n"
-    sources = [path for path in _FOLDER.glob(f"{template}*.yaml") if path.stem.partition("_")[0] == template]
+    files = _FOLDER.glob(f"{template}*.yaml")
+    sources = [path for path in files if re.split(r"[_.]", path.name)[0] == template]
     return {
         Path(name + path.stem.removeprefix(template) + ".yaml"): modeline
         + path.read_text(encoding="utf-8").replace(_STANDING_NAME, name)

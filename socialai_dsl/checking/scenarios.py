@@ -410,6 +410,8 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
 
 
 def _following(lost: DataPath) -> frozenset[str]:
+    if lost[:1] == ("tests",):
+        return frozenset()  # nothing else depends on a test
     return _FOLLOW_FROM_THE_GRAMMAR if lost == ("grammar",) else _MAY_FOLLOW
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 from socialai_dsl.checking.loaded import LoadedScenario
@@ -43,6 +44,11 @@ def check_tests(file: ResolvedFile, bag: DiagnosticBag) -> tuple[Tested, ...]:
         bag: takes the findings.
     """
     if file.kind != KIND:
+        try:
+            _require_scenario(file, ("tests",), file)
+        except ScenarioError as error:
+            bag.extend(error.diagnostics)
+            return ()
         return tuple(_Tests(file, file, file.path.name, "").tested(bag))
     shape = DiagnosticBag()
     model_of(TestsFile, file.tree, shape, parameters=False)
@@ -61,13 +67,22 @@ def check_tests(file: ResolvedFile, bag: DiagnosticBag) -> tuple[Tested, ...]:
     return tuple(_Tests(file, scenario, name, named.value[len(name) :]).tested(bag))
 
 
+def tested_by(file: ResolvedFile) -> ResolvedFile | None:
+    """The scenario that a file of tests is about; None if it cannot be read."""
+    named = file.tree.entry(KIND)
+    with suppress(ScenarioError):
+        return file.include((KIND,)) if named is not None else None
+    return None
+
+
 def _require_scenario(file: ResolvedFile, path: DataPath, found: ResolvedFile) -> None:
     """Raise S108 if what is to be tested is no scenario that can be played."""
     abstract = isinstance(found.data, dict) and found.data.get("abstract") is True
     if found.kind != "scenario" or abstract:
         what = "an abstract scenario" if abstract else f"a file of the kind `{found.kind}`"
         hint = "of a suite its members are tested" if found.kind == "suite" else None
-        raise file.error("S108", f"this is {what}; tests are of a scenario", file.tree.value_span(path), hint)
+        span = file.tree.key_span(path) if found is file else file.tree.value_span(path)
+        raise file.error("S108", f"this is {what}; tests are of a scenario", span, hint)
 
 
 def _is_in(part: Node, finding: Diagnostic) -> bool:
@@ -120,7 +135,7 @@ class _Tests:
         if others or not is_known:  # what is missing there may be what a test needs
             found = [d for d in found if d.code.startswith("S1")]
             bag.extend(() if scenario is self.file else others)
-        bag.extend(naming_the_patch(finding, scenario) for finding in found)
+        bag.extend(d if d.code.startswith("S1") else naming_the_patch(d, scenario) for d in found)
         if is_known and checked is not None and model is not None:
             suffix = self.suffix if of is None else of
             loaded = LoadedScenario(checked.name, checked, model, scenario)

@@ -1,9 +1,11 @@
 """Options that several commands have, and numbers on the command line."""
 
 import argparse
+import json
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
 from typing import Any, Final, TypeVar, get_args
 
 from socialai_dsl.analysis.effort import Effort
@@ -179,6 +181,16 @@ def percent(text: str) -> float:
     if not 0 <= found <= 100:
         raise argparse.ArgumentTypeError(f"got {_short(text)}, expected a per cent from 0 to 100")
     return found
+
+
+def known_room(text: str) -> Path | dict[str, Any]:
+    """A layout, or the file with one."""
+    if not text.lstrip().startswith("{"):
+        return Path(text)
+    try:
+        return dict(json.loads(text))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, which is no JSON: {error}") from None
 
 
 def identifier(text: str) -> str:

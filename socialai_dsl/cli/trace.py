@@ -2,15 +2,24 @@
 
 import argparse
 import sys
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from socialai_dsl.cli.arguments import add_scenario, episode, natural, positive, refuse, seed
+from socialai_dsl.cli.arguments import (
+    add_scenario,
+    episode,
+    known_room,
+    natural,
+    positive,
+    refuse,
+    seed,
+)
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Steps, Text
 from socialai_dsl.episodes.traces import TracedEpisode, reset_of
 from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.saving import TakenDialogue, save_test
+from socialai_dsl.loader.reader import display_name
 
 SUMMARY: Final = "print one episode step by step: the rules that fired, and why the others did not"
 
@@ -35,9 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--layout",
-        type=Path,
+        type=known_room,
         metavar="FILE",
-        help="start in the room that this JSON file describes (docs/layouts.md)",
+        help="start in the room that this JSON file, or JSON text, describes (docs/layouts.md)",
     )
     played = parser.add_mutually_exclusive_group()
     played.add_argument(
@@ -69,6 +78,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="print the trace as JSON, in the format that `socialai replay` reads and writes, with every rule and "
         "reason",
     )
+    parser.add_argument(
+        "--save-test",
+        metavar="NAME",
+        help="write what was played as a test of this name into the file beside the scenario, `SCENARIO.tests.yaml`; "
+        "of a scenario that ships it is printed",
+    )
+    parser.add_argument("--force", action="store_true", help="for --save-test: replace a test of this name")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
@@ -79,18 +95,33 @@ def execute(arguments: argparse.Namespace) -> Exit:
     reset = reset_of(drawn, arguments.index, arguments.test_episode, arguments.layout)
     if arguments.json and (arguments.why or arguments.first > 1):
         raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
+    if arguments.save_test is None:
+        refuse(arguments, ("force",), "it is for --save-test")
+    taken = TakenDialogue()
+    watching = [] if arguments.save_test is None else [taken]
     played = TracedEpisode(arguments.scenario, arguments.agent, arguments.do, drawn)
     try:
         played.require_names(arguments.why)
         last = None if arguments.steps is None else arguments.first + arguments.steps - 1
         if arguments.json:
             steps = Steps()
-            played.play(reset, [steps], lambda: steps.t == last)
+            played.play(reset, [steps, *watching], lambda: steps.t == last)
             print(played.document().as_json())
         else:
             text = Text(played, arguments.why, shows_color(sys.stdout), arguments.first)
-            played.play(reset, [text], lambda: text.t == last)
+            played.play(reset, [text, *watching], lambda: text.t == last)
             print("\n".join(text.end()))
     finally:
         played.close()
+    if arguments.save_test is not None:
+        _save(taken, arguments, reset)
     return Exit.GOOD
+
+
+def _save(taken: TakenDialogue, arguments: argparse.Namespace, reset: dict[str, Any]) -> None:
+    """Save the episode as a test; where it went is no part of the trace."""
+    saved = save_test(taken, arguments.scenario, reset, arguments.save_test, arguments.force)
+    if saved.path is None:
+        print(f"\n{saved.text}", end="", file=sys.stderr if arguments.json else sys.stdout)
+    else:
+        print(f"wrote the test `{arguments.save_test}` into {display_name(saved.path)}", file=sys.stderr)

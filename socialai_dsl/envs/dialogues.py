@@ -11,13 +11,13 @@ from typing import Any, Final
 
 from socialai_dsl.checking.tests import Tested
 from socialai_dsl.compilation import compile_scenario
-from socialai_dsl.diagnostics import Diagnostic
+from socialai_dsl.diagnostics import Diagnostic, ScenarioError
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.asking import Companion
 from socialai_dsl.envs.options import reset_arguments
 from socialai_dsl.envs.scenario_env import SILENCE, ScenarioEnv
 from socialai_dsl.envs.starts import misfit_of
-from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.reader import display_name, read_source
 from socialai_dsl.semantics.dialogues import OPEN
 from socialai_dsl.semantics.plans import ClaimPlan, DialoguePlan, DialogueStepPlan, LinePlan
 from socialai_dsl.semantics.terms import Const
@@ -103,7 +103,11 @@ class _Performance:
         except ValueError as error:
             yield self._unfit(error)
             return
-        except (RoomError, OSError) as error:
+        except ScenarioError as error:
+            place = self._room.value_span(("layout",))
+            yield from (replace(finding, span=place) for finding in error.diagnostics)
+            return
+        except RoomError as error:
             yield self._finding("S803", f"there is no such room: {error}", self._room.key_span(), ())
             return
         for step in self._plan.steps:
@@ -131,12 +135,23 @@ class _Performance:
     def _room(self) -> Node:
         return self._test.nearest(("room",))
 
+    def _file(self, name: str) -> Path:
+        """The file with a layout, which is named as seen from the file of the test."""
+        source = self._test.source
+        return (source.path.parent if source.path is not None else Path()) / name
+
     def _layout(self) -> Any:
-        """The layout, or the file with one, which is named as seen from the file of the test."""
-        layout, source = self._plan.room.layout, self._test.source
+        """The layout. Raises ValueError or ScenarioError where the file with it is none."""
+        layout = self._plan.room.layout
         if not isinstance(layout, str):
             return layout
-        return (source.path.parent if source.path is not None else Path()) / layout
+        file = self._file(layout)
+        if not file.resolve().is_relative_to(self._file("").resolve()):
+            raise ValueError(f"layout: {layout} lies outside of the folder of the test")
+        try:
+            return json.loads(read_source(file).text)
+        except (json.JSONDecodeError, RecursionError) as error:
+            raise ValueError(f"layout: {layout} is no JSON: {error}") from None
 
     def _begin(self) -> None:
         room = self._plan.room
@@ -191,6 +206,10 @@ class _Performance:
 
     def _untrue(self, claim: ClaimPlan, holds: bool) -> Diagnostic:
         said = f"`{claim.words}` is {'true' if holds else 'false'}, expected {'false' if holds else 'true'}"
+        if claim.state:
+            (member,) = claim.members
+            now = self._described(member).get("state")
+            said = f"`{member}` is {'elsewhere' if now is None else f'in `{now}`'}, expected `{claim.state}`"
         rules = [*self._rules("others", claim.members, ""), *self._rules("fired", claim.members, "")]
         return self._finding("S803", said, claim.span, rules)
 
@@ -226,16 +245,19 @@ class _Performance:
     def _speakers(self, lines: Iterable[str]) -> list[str]:
         """Who says lines, as far as their names are heard."""
         names: dict[str, list[str]] = {}
-        described = self._env.describe()
         for entity in self._env.scenario.entities:
             key = str(entity.key) if entity.index is None else f"{entity.key}[{entity.index}]"
-            own = described.get(entity.key, {})
-            own = own if entity.index is None else own[entity.index]
-            term = entity.name
+            own, term = self._described(key), entity.name
             fixed = term.type.words[term.value - term.type.low] if isinstance(term, Const) else key
             names.setdefault(str(own.get("name", fixed)), []).append(key)
         spoken = [line.partition(": ")[0] for line in lines]
         return list(dict.fromkeys(member for name in spoken for member in names.get(name, self._npcs())))
+
+    def _described(self, called: str) -> dict[str, Any]:
+        """What is known of a member of the cast or a thing now."""
+        key, _, index = called.partition("[")
+        described = self._env.describe().get(key, {})
+        return dict(described[int(index[:-1])] if index else described)
 
     def _npcs(self) -> list[str]:
         return [frame.member for frame in self._env.scenario.frames if frame.entity != 0]
@@ -263,12 +285,10 @@ class _Performance:
             words += ["--seed", str(self._seed)]
         if room.index is not None:
             words += ["--index", str(room.index)]
-        layout = self._layout()
-        if layout is not None:
-            shown = (
-                display_name(layout) if isinstance(layout, Path) else json.dumps(layout, ensure_ascii=False)
-            )
-            words += ["--layout", shown]
+        if isinstance(room.layout, str):
+            words += ["--layout", display_name(self._file(room.layout))]
+        elif room.layout is not None:
+            words += ["--layout", json.dumps(room.layout, ensure_ascii=False)]
         return shlex.join([*words, *(word for typed in self._done for word in ("--do", typed))])
 
 

@@ -155,3 +155,20 @@ def _holds(tree: ast.Expr, name: str) -> bool:
         case ast.Logic(op=op, operands=operands):
             return (all if op == "and" else any)(_holds(part, name) for part in operands)
     raise UsageError(f"-k: expected words with `and`, `or` and `not`, got {ast.unparse(tree)!r}")
+
+
+def passes(source: Source, name: str) -> None:
+    """See that a test passes, in a file that need not be on the disk yet.
+
+    Raises:
+        ScenarioError: with what is wrong.
+    """
+    assert source.path is not None, "internal: tests stand in files"
+    result = check(source.path, {source.path.resolve(): source})
+    result.read()
+    bag = DiagnosticBag()
+    for one in result.tested:
+        for plan in one.loaded.checked.tests:
+            if plan.name == name:
+                bag.extend(Rehearsal(one).play(plan))
+    bag.raise_errors(result.sources)

@@ -177,7 +177,7 @@ class _Test:
                 term = self._resolver.value(called, BOOL, scope)
                 sited = SitedTerm(term, scope.draws.site, self._findings.at(place))
                 probe = self._probe(noted.value(f"state.{member}", sited))
-                yield ClaimPlan(f"{member}.is({state})", True, probe, sited.span, (member,))
+                yield ClaimPlan(f"{member}.is({state})", True, probe, sited.span, (member,), state)
 
     def _check_member(self, path: DataPath, member: str) -> None:
         known = [name for name in self._resolver.symbols.cast if name in self._resolver.frames]

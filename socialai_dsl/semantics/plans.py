@@ -488,7 +488,7 @@ class ClaimPlan:
 
     Attributes:
         words: as written. expected: whether it is to hold. value: the probe that asks whether it does.
-        members: of the cast, whom it names.
+        members: of the cast, whom it names. state: of the one member, whose state it is about; empty of others.
     """
 
     words: str
@@ -496,6 +496,7 @@ class ClaimPlan:
     value: ProbePlan
     span: Span
     members: tuple[str, ...]
+    state: str = ""
 
 
 @dataclass(frozen=True, slots=True)

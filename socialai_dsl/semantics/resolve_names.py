@@ -558,7 +558,8 @@ def suggestion(
     kind = declared[near]
     section = {"object": "objects"}.get(kind, kind)
     span = resolver.findings.places.key_span((section, near))
-    return near, f"{kind}, line {span.line}"
+    is_here = span.file == resolver.findings.at(scope.path).file
+    return near, f"{kind}, line {span.line}" if is_here else f"{kind}, {span.file}:{span.line}"
 
 
 def _nearby(expected: Type | None, scope: Scope) -> Iterator[Iterable[str]]:

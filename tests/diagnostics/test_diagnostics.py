@@ -17,6 +17,7 @@ import pytest
 from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.diagnostics import CODES, render_text
+from socialai_dsl.evaluation.testing import play_tests
 from socialai_dsl.frontend import CheckResult, check
 from tests.slips import SLIPS, write_mistakes
 
@@ -32,6 +33,7 @@ NOT_FROM_ONE_FILE = {
     "S508": "about a name on the command line",
     "S801": "found by trying a scenario out",
     "W802": "found by trying a scenario out",
+    "S803": "found by playing a test",
 }
 
 
@@ -99,11 +101,20 @@ def shown(page: str, part: str, folder: Path) -> CheckResult:
             (folder / (named[1] if named else name)).write_text(text, encoding="utf-8")
         elif language == "console":
             program, command, *options, name = shlex.split(text.removeprefix("$ "))
-            assert (program, command) == ("socialai", "validate"), page
+            assert program == "socialai", page
+            if command == "test":
+                return with_tests_played(name)
+            assert command == "validate", page
             assert options in ([], ["--deep"]), page
             if options:
                 return tried_out(name)
     return check(name)
+
+
+def with_tests_played(name: str) -> CheckResult:
+    """What is found in a file, and what playing its tests shows."""
+    found = [finding for one in play_tests([name]) for finding in one.outcome.diagnostics]
+    return replace(check(name), diagnostics=tuple(found))
 
 
 def tried_out(name: str) -> CheckResult:

@@ -13,7 +13,7 @@ from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
 
 ROOT = Path(__file__).parent.parent.parent
-SHIPPED = sorted(ROOT.glob("scenarios/talkitout*.yaml"))
+SHIPPED = sorted(set(ROOT.glob("scenarios/talkitout*.yaml")) - set(ROOT.glob("scenarios/*.tests.yaml")))
 SMALL = ROOT / "tests" / "diagnostics" / "small.yaml"
 
 

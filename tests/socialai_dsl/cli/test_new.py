@@ -25,7 +25,7 @@ def test_the_file_has_its_name_and_no_findings(name: str, capsys: Capture) -> No
     assert "\nscenario: corridor\n" in Path("corridor.yaml").read_text(encoding="utf-8")
     capsys.readouterr()
     assert main(["validate", "--strict", "."]) == 0
-    assert capsys.readouterr().out == "2 files checked: 0 errors, 0 warnings\n"
+    assert capsys.readouterr().out == "3 files checked: 0 errors, 0 warnings\n"
 
 
 @pytest.mark.parametrize("template", TEMPLATES)

@@ -14,7 +14,7 @@ from trainer.config import HYPER
 
 Capture = pytest.CaptureFixture[str]
 
-NO_NUMBERS = {None, str, Path, "identifier", "_parameter"}
+NO_NUMBERS = {None, str, Path, "identifier", "known_room", "_parameter"}
 """Types of options that are words; every other type is held to be a number."""
 POSITIONALS = {
     "evaluate": {"run": "llm:m"},

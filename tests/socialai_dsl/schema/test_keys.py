@@ -114,6 +114,7 @@ def test_a_text_is_a_text_whatever_yaml_takes_it_for() -> None:
         "start": ("frames", "f", "start"),
         "ask": ("probes", "p", "ask"),
         "answers": ("probes", "p", "answers", 0),
+        "do": ("tests", "t", "play", 0, "do"),
     }
     for key in texts:
         assert value_at(places.get(key, ("x", key)), "No") == "No", key
