@@ -201,7 +201,8 @@ class _Test:
         members = [m for name in named for m in symbols.groups.get(name, (name,)) if m in symbols.cast]
         probe = self._probe(noted.value(part, condition))
         words = " ".join(str(raw).split())
-        return ClaimPlan(words, expected, probe, condition.span, tuple(dict.fromkeys(members)))
+        span = self._findings.at(path, width=len(str(raw)))
+        return ClaimPlan(words, expected, probe, span, tuple(dict.fromkeys(members)))
 
     def _probe(self, value: Drawn) -> ProbePlan:
         """What asks for a value when a step is done."""

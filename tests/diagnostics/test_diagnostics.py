@@ -30,7 +30,6 @@ ONE_SLIP = ("75", "76", "77", "78", "80", "81", "82", "83")
 
 NOT_FROM_ONE_FILE = {
     "S507": "needs dozens of files",
-    "S508": "about a name on the command line",
     "S801": "found by trying a scenario out",
     "W802": "found by trying a scenario out",
     "S803": "found by playing a test",

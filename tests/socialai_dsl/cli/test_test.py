@@ -115,7 +115,7 @@ def test_a_test_that_fails_says_why_and_how_to_see_it(capsys: Capture) -> None:
         *out.splitlines()[4:7],
         "lodge.tests.yaml:7:78: S803 `mine`, step 2: `porter.asked == 1` is false, expected true",
         '   7 |       - {do: Hello there, hears: "Ann: Who?", state: {porter: asking}, true: porter.asked == 1}',
-        "                                                                                    ^",
+        "                                                                                    ^~~~~~~~~~~~~~~~~",
         *out.splitlines()[4:7],
     ]
 
