@@ -44,7 +44,7 @@ def test_a_folder_is_searched_and_json_is_pure(capsys: Capture) -> None:
 
 def test_files_given_twice_are_checked_once(capsys: Capture) -> None:
     assert main(["validate", "sound.yaml", "sound.yaml", "."]) == 1
-    assert capsys.readouterr().out.splitlines()[-2] == "3 files checked: 1 error, 0 warnings"
+    assert capsys.readouterr().out.splitlines()[-2] == "4 files checked: 1 error, 0 warnings"
 
 
 @pytest.mark.parametrize("name", ["nowhere.yaml", "no_such_scenario", "sound.yaml+nothing"])
