@@ -68,8 +68,8 @@ def test_the_workflow(repository: Path, capsys: Capture) -> None:
     workflow = yaml.safe_load(block("yaml", "actions/checkout"))
     steps = workflow["jobs"]["validate"]["steps"]
     commands = [shlex.split(step["run"]) for step in steps if step.get("run", "").startswith("socialai")]
-    assert len(commands) == 2
-    assert [main(words[1:]) for words in commands] == [0, 0]
+    assert len(commands) == 3
+    assert [main(words[1:]) for words in commands] == [0, 0, 0]
     break_one(repository)
     capsys.readouterr()
     assert main(commands[1][1:]) == 1
