@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Final
 
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
@@ -15,8 +16,11 @@ from socialai_dsl.schema.files import TestsFile
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.source import DataPath, Node
 
-KIND = "tests_of"
+KIND: Final = "tests_of"
 """The key that says that a file has tests."""
+
+MOST_VARIANTS: Final = 64
+"""How many different scenarios the tests of a file may play; each takes about as long to check as the scenario."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ def check_tests(file: ResolvedFile, bag: DiagnosticBag) -> tuple[Tested, ...]:
     shape = DiagnosticBag()
     model_of(TestsFile, file.tree, shape, parameters=False)
     tests = file.tree.entry("tests")
-    bag.extend(finding for finding in shape if tests is None or not _is_in(tests, finding))
+    bag.extend(shape if tests is None else _apart(tests, shape)[1])
     named = file.tree.entry(KIND)
     if tests is None or named is None or not isinstance(named.value, str):
         return ()
@@ -85,11 +89,16 @@ def _require_scenario(file: ResolvedFile, path: DataPath, found: ResolvedFile) -
         raise file.error("S108", f"this is {what}; tests are of a scenario", span, hint)
 
 
-def _is_in(part: Node, finding: Diagnostic) -> bool:
-    """Whether a finding points into a part of a file."""
+def _apart(part: Node, findings: Iterable[Diagnostic]) -> tuple[list[Diagnostic], list[Diagnostic]]:
+    """The findings that point into a part of a file, and the others."""
     spans = [span for _, node in part.walk() for span in (node.span.key, node.span.value) if span is not None]
-    lines = [span.line for span in spans]
-    return finding.span.file == part.file and min(lines) <= finding.span.line <= max(lines)
+    lines = range(min(span.line for span in spans), max(span.line for span in spans) + 1)
+    inside: list[Diagnostic] = []
+    others: list[Diagnostic] = []
+    for finding in findings:
+        is_in = finding.span.file == part.file and finding.span.line in lines
+        (inside if is_in else others).append(finding)
+    return inside, others
 
 
 @dataclass(frozen=True)
@@ -116,6 +125,10 @@ class _Tests:
         groups: dict[str | None, dict[str, Node]] = {}
         for name, test in tests.children.items():
             groups.setdefault(test.text("of"), {})[name] = test
+        if len(groups) > MOST_VARIANTS:
+            message = f"the tests of a file play at most {MOST_VARIANTS} variants, these {len(groups)}"
+            bag.error("S106", message, tests.key_span(), hint="write some of them into another file")
+            return
         for of, named in groups.items():
             yield from self._of(of, Node(tests.span, children=named), bag)
 
@@ -130,8 +143,8 @@ class _Tests:
                 bag.extend(error.diagnostics)
                 is_known = False
         checked, model = check_scenario(scenario, own, tests)
-        found = [d for d in own if _is_in(tests, d)]
-        others = [d for d in own if d.severity is Severity.ERROR and d not in found]
+        found, others = _apart(tests, own)
+        others = [d for d in others if d.severity is Severity.ERROR]
         if others or not is_known:  # what is missing there may be what a test needs
             found = [d for d in found if d.code.startswith("S1")]
             bag.extend(() if scenario is self.file else others)

@@ -9,6 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from socialai_dsl.checking.tests import Tested
 from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
@@ -19,7 +22,7 @@ from socialai_dsl.envs.scenario_env import SILENCE, ScenarioEnv
 from socialai_dsl.envs.starts import misfit_of
 from socialai_dsl.loader.reader import display_name, read_source
 from socialai_dsl.semantics.dialogues import OPEN
-from socialai_dsl.semantics.plans import ClaimPlan, DialoguePlan, DialogueStepPlan, LinePlan
+from socialai_dsl.semantics.plans import ClaimPlan, DialoguePlan, DialogueStepPlan, LinePlan, RulePlan
 from socialai_dsl.semantics.terms import Const
 from socialai_dsl.source import Node, Span
 from socialai_dsl.vocabulary import TRUTHS
@@ -91,6 +94,8 @@ class _Performance:
     ) -> None:
         self._env, self._tested, self._plan, self._seed = env, tested, plan, seed
         self._companion = companion
+        self._reset: dict[str, Any] = {}
+        self._actions: list[NDArray[np.int64]] = []
         self._done: list[str] = []
         self._earned = 0.0
         self._end: _End | None = None
@@ -155,7 +160,7 @@ class _Performance:
 
     def _begin(self) -> None:
         room = self._plan.room
-        reset = reset_arguments(self._seed, room.index, room.test_episode, self._layout())
+        self._reset = reset = reset_arguments(self._seed, room.index, room.test_episode, self._layout())
         observation, _ = self._env.reset(**reset)
         if self._companion is not None:
             self._companion.begin(reset.get("seed"), reset["options"], observation["image"])
@@ -167,11 +172,12 @@ class _Performance:
             return misfit_of(error, layout, self._room.nearest(("layout",)))
         return Diagnostic("S204", str(error), self._room.value_span(("layout",)))
 
-    def _act(self, act: tuple[str | None, str | None], typed: str) -> list[str]:
+    def _act(self, act: tuple[int, ...], typed: str) -> list[str]:
         """Do something; what is heard."""
-        action = self._env.encode_action(act)
+        action = np.array(act, np.int64)
         observation, reward, terminated, truncated, info = self._env.step(action)
         self._done.append(typed)
+        self._actions.append(action)
         self._earned += reward
         if terminated or truncated:
             self._end = _End(info["outcome"], bool(info["success"]))
@@ -206,12 +212,32 @@ class _Performance:
 
     def _untrue(self, claim: ClaimPlan, holds: bool) -> Diagnostic:
         said = f"`{claim.words}` is {'true' if holds else 'false'}, expected {'false' if holds else 'true'}"
+        part: list[str] = []
         if claim.state:
             (member,) = claim.members
             now = self._described(member).get("state")
             said = f"`{member}` is {'elsewhere' if now is None else f'in `{now}`'}, expected `{claim.state}`"
-        rules = [*self._rules("others", claim.members, ""), *self._rules("fired", claim.members, "")]
+        elif claim.expected and self._done:
+            why = self._false_part(claim)
+            part = [f"-> {why}"] if why != f"{claim.words} is false" else []
+        rules = [*part, *self._rules("others", claim.members, ""), *self._rules("fired", claim.members, "")]
         return self._finding("S803", said, claim.span, rules)
+
+    def _false_part(self, claim: ClaimPlan) -> str:
+        """The part of a condition that is false, with its values, as they are told of a rule that did not fire.
+
+        The episode is played again with a rule of the world that has this condition, and does nothing.
+        """
+        checked, asked = self._tested.loaded.checked, claim.value.answer.value
+        rule = RulePlan(claim.value.name, asked.site, claim.span, when=asked)
+        known = {item.path: item for item in (*claim.value.remembered, *checked.remembered)}
+        ruled = replace(checked, rules=(*checked.rules, rule), remembered=tuple(known.values()))
+        env = ScenarioEnv(compile_scenario(ruled), scenarios=(ruled,))
+        env.reset(**self._reset)
+        for action in self._actions:
+            env.step(action)
+        others = (entry for entry in env.explain()["others"] if entry["name"] == rule.name)
+        return next((str(entry["why"]) for entry in others), "it was not asked")
 
     def _wrong_end(self) -> Iterator[Diagnostic]:
         if self._plan.ends is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final
 
@@ -32,23 +32,33 @@ OPEN: Final = "open"
 ENDS: Final = ("success", "failure", "deadly", "timeout", OPEN)
 """What `ends` may say in any scenario."""
 
+MOST_VALUES: Final = 400
+"""How many conditions, states and values in lines a test may have."""
+
 
 def dialogues(resolver: Resolver, outcomes: Sequence[OutcomePlan]) -> tuple[DialoguePlan, ...]:
     """The entries in the order written; those with a mistake are left out once it has been reported."""
+    tests = resolver.symbols.scenario.tests
+    if not tests:
+        return ()
+    sentences, sayable = resolver.symbols.sentences, dict[str, tuple[int, ...]]()
+    for template, choices in sentences.each():
+        sayable.setdefault(normal(sentences.text(template, choices)), (template, *choices))
     found = []
-    with resolver.registers.apart():
-        for name, test in resolver.symbols.scenario.tests.items():
-            with surviving():
-                found.append(_Test(resolver, name, test).plan(outcomes))
+    for name, test in tests.items():
+        with resolver.registers.apart(), surviving():
+            found.append(_Test(resolver, name, test, sayable).plan(outcomes))
     return tuple(found)
 
 
 class _Test:
     """One entry, and where it stands."""
 
-    def __init__(self, resolver: Resolver, name: str, test: DialogueTest) -> None:
+    def __init__(
+        self, resolver: Resolver, name: str, test: DialogueTest, sayable: Mapping[str, tuple[int, ...]]
+    ) -> None:
         self._resolver, self._findings = resolver, resolver.findings
-        self._name, self._test = name, test
+        self._name, self._test, self._sayable = name, test, sayable
         self._path: DataPath = ("tests", name)
         self._probes: list[ProbePlan] = []
         self._fine = True
@@ -62,8 +72,9 @@ class _Test:
             self._check_length()
         with self._surviving():
             self._check_end(outcomes)
-        sayable = {normal(text): text for text in self._resolver.utterances.all_texts()}
-        steps = [self._step(i, step, sayable) for i, step in enumerate(test.play)]
+        steps = [self._step(i, step) for i, step in enumerate(test.play)]
+        with self._surviving():
+            self._check_number()
         if not self._fine:
             raise FailedError
         return DialoguePlan(
@@ -108,6 +119,14 @@ class _Test:
                     hint = "delete what comes from here on, or give the scenario a longer `horizon`"
                     raise self._findings.fail("S804", message, self._findings.at(path), hint=hint)
 
+    def _check_number(self) -> None:
+        if len(self._probes) > MOST_VALUES:
+            message = f"a test has at most {MOST_VALUES} conditions, states and values in lines"
+            place = self._findings.places.key_span(self._path)
+            raise self._findings.fail(
+                "S106", message, place, hint="let several tests look at some of them each"
+            )
+
     def _check_end(self, outcomes: Sequence[OutcomePlan]) -> None:
         known = [*ENDS, *(outcome.name for outcome in outcomes if "@" not in outcome.name)]
         word = self._test.ends
@@ -120,13 +139,13 @@ class _Test:
 
     # -- steps ---------------------------------------------------------------------------------------------------
 
-    def _step(self, number: int, step: DialogueStep, sayable: dict[str, str]) -> DialogueStepPlan:
+    def _step(self, number: int, step: DialogueStep) -> DialogueStepPlan:
         path: DataPath = (*self._path, "play", number)
         noted = NotedValues(self._resolver, f"{self._name}.{number}", "a test draws nothing itself")
         acts = []
         for place, typed in self._findings.each((*path, "do"), step.do):
             with self._surviving():
-                acts.append(self._act(place, typed, sayable))
+                acts.append(self._act(place, typed))
         hears = None if step.hears == (ANYTHING,) else tuple(self._lines(path, step, noted))
         claims = [*self._states(path, step, noted)]
         for key, expected, written in (("true", True, step.true_), ("not", False, step.not_)):
@@ -136,8 +155,8 @@ class _Test:
         span = self._findings.places.value_span(path)
         return DialogueStepPlan(span, tuple(acts), step.do, hears, tuple(claims))
 
-    def _act(self, path: DataPath, typed: str, sayable: dict[str, str]) -> tuple[str | None, str | None]:
-        """Body action and sentence of what is typed."""
+    def _act(self, path: DataPath, typed: str) -> tuple[int, ...]:
+        """What is typed, as an action of the space."""
         if not self._findings.must_be_one_line(path, typed):
             raise FailedError
         typed = typed.strip()
@@ -147,8 +166,11 @@ class _Test:
             message = f"the agent of this scenario has no action `{action}`"
             place = self._findings.at(path, width=len(action))
             raise self._findings.fail("S320", message, place, hint=f"it has {', '.join(actions)}")
-        if said is None or normal(said) in sayable:
-            return action, None if said is None else sayable[normal(said)]
+        if said is None or normal(said) in self._sayable:
+            own = [word for word in PRIMITIVES if word in actions]
+            silence = (0,) * (1 + len(self._resolver.symbols.sentences.slots))
+            spoken = silence if said is None else self._sayable[normal(said)]
+            return (len(own) if action is None else own.index(action), int(said is not None), *spoken)
         near = Phrases(actions, self._resolver.symbols.sentences).corrected(typed)
         hint: str | None = f"movements are {', '.join((*actions, *STANDING))}"
         span = self._findings.at(path, width=len(typed))

@@ -512,13 +512,13 @@ class DialogueStepPlan:
     """A step of a test.
 
     Attributes:
-        acts: body action and sentence of each act, None for none. typed: the same as written.
+        acts: actions of the space, int (heads,) each. typed: the same as written.
         hears: all lines; None: whatever is heard.
         claims: what is so after the acts, or not.
     """
 
     span: Span
-    acts: tuple[tuple[str | None, str | None], ...]
+    acts: tuple[tuple[int, ...], ...]
     typed: tuple[str, ...]
     hears: tuple[LinePlan, ...] | None
     claims: tuple[ClaimPlan, ...]

@@ -96,6 +96,28 @@ SCENARIOS: dict[str, Bomb] = {
         ),
         400,
     ),
+    "tests": Bomb(
+        lambda n: _scenario("tests:" + _listed(n, lambda i: f"t{i}: {{play: [{{do: Say hi}}]}}", "  ")), 4_000
+    ),
+    "wrong tests": Bomb(
+        lambda n: _scenario("tests:" + _listed(n, lambda i: f"t{i}: {{play: [{{do: Sai h{i}}}]}}", "  ")),
+        2_000,
+    ),
+    "tests of variants": Bomb(
+        lambda n: _scenario(
+            "tests:" + _listed(n, lambda i: f"t{i}: {{of: +v{i}, play: [{{do: left}}]}}", "  ")
+        ),
+        100,
+    ),
+    "conditions of a test": Bomb(
+        lambda n: _scenario(
+            "tests: {a: {play: [{true: [" + _each(n, lambda i: f"prev(t) == {i}, ") + "]}]}}\n"
+        ),
+        1_000,
+    ),
+    "acts of a test": Bomb(
+        lambda n: _scenario("tests: {a: {play: [{do: [" + _each(n, lambda i: "Say hi, ") + "]}]}}\n"), 20_000
+    ),
     "draws": Bomb(lambda n: _scenario("let:" + _listed(n, lambda i: f"v{i}: pick(1..9)", "  ")), 4_000),
     "draws that lead to those above": Bomb(
         lambda n: _scenario(

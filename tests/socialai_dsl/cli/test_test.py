@@ -116,6 +116,7 @@ def test_a_test_that_fails_says_why_and_how_to_see_it(capsys: Capture) -> None:
         "lodge.tests.yaml:7:78: S803 `mine`, step 2: `porter.asked == 1` is false, expected true",
         '   7 |       - {do: Hello there, hears: "Ann: Who?", state: {porter: asking}, true: porter.asked == 1}',
         "                                                                                    ^~~~~~~~~~~~~~~~~",
+        "  -> porter.asked == 1 is false: porter.asked is 0",
         *out.splitlines()[4:7],
     ]
 
