@@ -68,6 +68,16 @@ def offered(text: str, folder: Path | None = None) -> list[str]:
         ("outcome:", "probes: {q: {answer: exit.c^}}\noutcome:", "color"),
         ("outcome:", "probes: {q: {ask: Which <^}}\noutcome:", "shade"),
         ("outcome:", "probes: {q: {answers: [the <exit.c^]}}\noutcome:", "color"),
+        ("outcome:", "tests: {q: {play: [{do: W^}]}}\noutcome:", "Where is the exit"),
+        ("outcome:", "tests: {q: {play: [{do: [left, f^]}]}}\noutcome:", "forward"),
+        ("outcome:", "tests: {q: {play: [{hea^}]}}\noutcome:", "hears"),
+        ("outcome:", "tests: {q: {play: [{state: {a^}}]}}\noutcome:", "ann"),
+        ("outcome:", "tests: {q: {play: [{state: {ann: w^}}]}}\noutcome:", "waiting"),
+        ("outcome:", "tests: {q: {play: [{true: ann.^}]}}\noutcome:", "is"),
+        ("outcome:", "tests: {q: {play: [{not: [ag^]}]}}\noutcome:", "agent"),
+        ("outcome:", 'tests: {q: {play: [{hears: "Ann: The <^"}]}}\noutcome:', "shade"),
+        ("outcome:", "tests: {q: {ends: t^}}\noutcome:", "timeout"),
+        ("outcome:", "tests: {q: {ro^}}\noutcome:", "room"),
     ],
 )
 def test_completion(old: str, new: str, expected: str | None) -> None:
@@ -151,3 +161,43 @@ def test_every_position_is_survived() -> None:
 
 def test_every_instruction_has_a_usage() -> None:
     assert {signature.name for signature in SIGNATURES if signature.name not in usage(signature)} == set()
+
+
+IN_A_FILE = "tests_of: a.yaml\ntests:\n  q:\n    play:\n      - {do: left}\n"
+
+
+@pytest.mark.parametrize(
+    ("new", "some", "others"),
+    [
+        ("do: ^", {"left", "none", "Where is the exit"}, {"go_to", "face", "agent"}),
+        ("do: left, state: {ann: ^}", {"waiting", "content"}, {"agent"}),
+        ("do: left, true: ^", {"agent", "exit", "t"}, {"waiting"}),
+        ("do: left, hears: ^", set(), {"agent", "Where is the exit"}),
+        ("do: left, ^", {"hears", "state", "true", "not"}, {"do", "say"}),
+    ],
+)
+def test_completion_in_a_file_of_tests_knows_the_scenario(new: str, some: set[str], others: set[str]) -> None:
+    found = set(offered(IN_A_FILE.replace("do: left", new)))
+    assert some <= found
+    assert not others & found
+
+
+def test_files_are_offered_for_what_is_tested(tmp_path: Path) -> None:
+    (tmp_path / "lodge.yaml").write_text("")
+    assert offered(IN_A_FILE.replace("a.yaml", "lo^"), tmp_path) == ["lodge.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("word", "about"),
+    [
+        ("pl^ay", "what is done, step by step"),
+        ("d^o", "an act or several, as typed"),
+        ("tests^_of", "the scenario's file"),
+    ],
+)
+def test_keys_of_tests_are_explained(word: str, about: str) -> None:
+    plain, line, column = marked(IN_A_FILE.replace(word.replace("^", ""), word, 1))
+    document = read_document(Source("", plain))
+    found = explain(document, read_document(Source("", TEXT)).data, line, column)
+    assert found is not None
+    assert about in found[0]
