@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
@@ -211,6 +212,27 @@ def test_what_the_page_about_reasons_shows_is_printed(
     for command, output in with_output:
         assert main.main(shlex.split(command)[2:]) == 0
         assert capsys.readouterr().out.rstrip() == output.rstrip(), command
+
+
+def test_what_the_page_about_tests_shows_is_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All but the seconds; the scenarios are one that ships and that of the page about reasons."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "scenarios" / "talkitout.yaml", tmp_path)
+    (guide,) = blocks(ROOT / "docs" / "explain.md", "yaml")
+    Path("shy_guide.yaml").write_text(guide, encoding="utf-8")
+    page = ROOT / "docs" / "tests.md"
+    for text in blocks(page, "yaml"):
+        Path(text.split()[1].replace(".yaml", ".tests.yaml")).write_text(text, encoding="utf-8")
+    shown = [text.partition("\n") for text in blocks(page, "console")]
+    with_output = [(command, output) for command, _, output in shown if output and not output.startswith("$")]
+    assert len(with_output) == 2
+    for command, output in with_output:
+        main.main(shlex.split(command)[2:])
+        printed = capsys.readouterr().out.splitlines()
+        assert printed[:-1] == output.splitlines()[:-1]
+        assert printed[-1].rpartition(",")[0] == output.splitlines()[-1].rpartition(",")[0]
 
 
 # -- the reference is complete ------------------------------------------------------------------------------------
