@@ -22,6 +22,8 @@ from socialai_dsl.checking.scenarios import (
     check_scenario,
     naming_the_patch,
     of_other_values,
+    with_findings_on_rivals,
+    with_rival,
 )
 from socialai_dsl.checking.suites import check_suite
 from socialai_dsl.checking.tests import KIND as TESTS_OF
@@ -345,6 +347,22 @@ def closest_script(
         raise
 
 
+def rival_of(loaded: LoadedScenario, rival: str) -> LoadedScenario:
+    """A scenario whose agent follows one of its rivals.
+
+    Raises:
+        ValueError: it has no rival of this name.
+    """
+    if rival not in loaded.scenario.rivals:
+        raise ValueError(f"rival: got {rival!r}, expected one of {', '.join(loaded.scenario.rivals)}")
+    resolved, bag = with_rival(loaded.resolved, rival), DiagnosticBag()
+    checked, scenario = check_scenario(resolved, bag)
+    bag.raise_errors(resolved.files)
+    assert checked is not None, "internal: rivals have been checked"
+    assert scenario is not None, "internal: rivals have been checked"
+    return LoadedScenario(f"{loaded.name}+{rival}", checked, scenario, resolved)
+
+
 def _oracle_of(name: str) -> str:
     base, mark, parameters = name.partition("?")
     return f"{base}+oracle{mark}{parameters}"
@@ -461,6 +479,9 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, te
     checked, scenario = _checked(resolved, bag)
     if checked is not None:
         _check_claimed_script(name, checked, texts, bag)
+    if scenario is not None and checked is not None and scenario.rivals:
+        bag = with_findings_on_rivals(bag, resolved, scenario)
+        checked = None if bag.has_errors else checked
     if every_value and checked is not None:
         bag.extend(of_other_values(resolved))
     # A variant's tests are those that say so (`of`); what a scenario is without it need not be true of it.

@@ -44,6 +44,7 @@ from socialai_dsl.analysis.twins import (
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.table import Table
+from socialai_dsl.frontend import rival_of
 from socialai_dsl.program import Program, Register
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.terms import Const, InState, SaidBy, walk
@@ -74,6 +75,7 @@ class Trial:
         self.program = compile_loaded(loaded)
         self.script = scripted
         self.scripted = None if scripted is None else compile_loaded(scripted)
+        self._rivals: dict[str, NDArray[np.bool_]] = {}
 
     @cached_property
     def rooms(self) -> Rooms:
@@ -88,6 +90,12 @@ class Trial:
         if self.scripted is None:
             return np.zeros(self.effort.rooms, np.bool_)
         return solved_by_script(self.scripted, self.effort)
+
+    def solved_by(self, rival: str) -> NDArray[np.bool_]:
+        """In which rooms a rival succeeds, (rooms,). Keeps to the time that limits it (`Clock.limiting`)."""
+        if rival not in self._rivals:
+            self._rivals[rival] = solved_by_script(compiled(rival_of(self.loaded, rival)), self.effort)
+        return self._rivals[rival]
 
     def successes(self, effort: Effort, what: str) -> Iterator[Finding]:
         """A shortest success of room after room."""
@@ -104,6 +112,8 @@ class Trial:
                 return _oracle(self, plan, effort)
             case "script":
                 return _script(self, plan, effort)
+            case "rival":
+                return _rival(self, plan)
             case "needs":
                 return _needs(self, plan, effort)
             case "only_through":
@@ -247,6 +257,25 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if idle.any():
         said += f"; in {int(idle.sum())} of them a success comes of itself"
     return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests)
+
+
+def _rival(trial: Trial, plan: PropertyPlan) -> Report:
+    """Whether a strategy that lacks the skill fails often enough."""
+    assert plan.share is not None, "internal: a rival has a share"
+    won, idle = trial.solved_by(plan.rival), trial.rooms.solved_by_idling
+    rooms, count = trial.effort.rooms, int(won.sum())
+    said = f"it solves {count} of {rooms_text(rooms)}"
+    if trial.scripted is not None:
+        said += f", the scenario's own script {int(trial.solved.sum())}"
+    rests = int((~idle).sum())
+    if not rests:
+        said = (
+            f"it rests on nothing: in all of {rooms_text(rooms)} a success comes of itself, without the agent"
+        )
+    holds = rests > 0 and won.mean() <= plan.share + 1e-9
+    against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
+    verdict = Verdict.HOLDS if holds else Verdict.FAILS
+    return Report(verdict, rooms, rooms - count, 0, against, said, rests)
 
 
 def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

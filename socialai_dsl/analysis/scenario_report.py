@@ -173,6 +173,8 @@ def _depth(found: Depth, rooms: int) -> Iterator[str]:
         yield f"  the script solves {rooms - len(found.unsolved)} of {rooms} rooms"
         if found.unsolved:
             yield f"    not {_listed(found.unsolved)}"
+    for name, solved in found.rivals.items():
+        yield f"  the rival `{name}` solves {solved} of {rooms} rooms"
     if found.alone is not None:
         yield from _alone(found.alone)
 

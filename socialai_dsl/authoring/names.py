@@ -54,7 +54,7 @@ def last_key(path: DataPath) -> str:
 
 def visible(data: Data, path: DataPath) -> list[Name]:
     """The names that an expression at a path may use: those of its frame, then those of the scenario."""
-    frame = path[:2] if path[:1] == ("frames",) else ()
+    frame = path[:2] if _in_a_frame(path) else ()
     found = [
         name
         for section, kind in _OF_FRAMES.items()
@@ -72,11 +72,16 @@ def declared(data: Data, path: DataPath, kind: str) -> list[Name]:
     return [Name(str(key).partition("(")[0], kind, (*path, key)) for key in section]
 
 
-def states(data: Data, frame: str) -> list[Name]:
-    """The states of a frame, and those of its steps that have a name."""
-    found = declared(data, ("frames", frame, "states"), f"a state of `{frame}`")
-    named = _named_steps(data, ("frames", frame, "steps"))
-    return [*found, *(Name(name, f"a step of `{frame}`", path) for path, name in named)]
+def _in_a_frame(path: DataPath) -> bool:
+    """Whether a path leads into a frame, of which rivals are some."""
+    return path[:1] in (("frames",), ("rivals",))
+
+
+def states(data: Data, frame: DataPath) -> list[Name]:
+    """The states of the frame at a path, and those of its steps that have a name."""
+    found = declared(data, (*frame, "states"), f"a state of `{frame[-1]}`")
+    named = _named_steps(data, (*frame, "steps"))
+    return [*found, *(Name(name, f"a step of `{frame[-1]}`", path) for path, name in named)]
 
 
 def _named_steps(data: Data, path: DataPath) -> Iterator[tuple[DataPath, str]]:
@@ -112,9 +117,9 @@ def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
         return []
     if path[:1] == ("tests",) and path[-2:-1] == ("state",):
         frame = frame_of(data, str(path[-1]).partition("[")[0])
-        return states(data, frame) if frame else []
-    if path[:1] == ("frames",) and (key in ("goto", "goto_now") or path[2:] == ("start",)):
-        return states(data, str(path[1]))
+        return states(data, ("frames", frame)) if frame else []
+    if _in_a_frame(path) and (key in ("goto", "goto_now") or path[2:] == ("start",)):
+        return states(data, path[:2])
     if key == "frame":
         return declared(data, ("frames",), "a frame")
     if key == "role":
@@ -123,6 +128,8 @@ def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
         return visible(data, ())
     if before.endswith("is("):
         subject = before.removesuffix(".is(").split()[-1] if before.strip() else ""
-        frame = frame_of(data, subject.strip("(")) or (str(path[1]) if path[:1] == ("frames",) else None)
-        return states(data, frame) if frame else []
+        followed = frame_of(data, subject.strip("("))
+        if followed is not None:
+            return states(data, ("frames", followed))
+        return states(data, path[:2]) if _in_a_frame(path) else []
     return visible(data, path)

@@ -16,7 +16,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
-from socialai_dsl.loader.patches import Edit
+from socialai_dsl.loader.patches import Edit, let_play
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
@@ -288,7 +288,7 @@ _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 """What may be wrong because a patch changed the grammar."""
 
 _OF_ALL_VARIANTS = frozenset({"W314", "W317"})
-"""What a variant may leave without a use in parts that are there for the others."""
+"""What a variant or rival may leave without a use in parts that are there for the others."""
 
 _MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 S310 S315 S401 S402".split())
 """What may be wrong only because a part of the file was left out, which has been reported."""
@@ -365,6 +365,37 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag, tests: Node | None = No
     if shaped.model is None or abstract or failed:
         return None
     return Draft(shaped.model, resolved.name, shaped, values, bool(resolved.edits))
+
+
+def with_rival(resolved: ResolvedFile, rival: str) -> ResolvedFile:
+    """A scenario whose agent follows one of its rivals."""
+
+    def change(tree: Node) -> None:
+        let_play(tree, rival)
+
+    return resolved.changed(change)
+
+
+def with_findings_on_rivals(
+    found: DiagnosticBag, resolved: ResolvedFile, scenario: Scenario
+) -> DiagnosticBag:
+    """What was found in a scenario without errors, and what is wrong with its rivals, each checked where it plays.
+
+    What a rival has a use for is not reported as idle.
+    """
+    bag, idle = DiagnosticBag(), {d for d in found if d.code in _OF_ALL_VARIANTS}
+    for name, rival in scenario.rivals.items():
+        own = DiagnosticBag()
+        if scenario.frames.get(name) == rival:  # it plays already
+            own = found
+        elif name in scenario.frames:
+            span = resolved.tree.key_span(("rivals", name))
+            own.error("S213", f"there is a frame `{name}`; call the rival something else", span)
+        else:
+            check_scenario(with_rival(resolved, name), own)
+        bag.extend(d for d in own if d.code not in _OF_ALL_VARIANTS)
+        idle &= set(own)
+    return DiagnosticBag([*(d for d in found if d.code not in _OF_ALL_VARIANTS), *idle, *bag])
 
 
 def _report_idle_variants(resolved: ResolvedFile, bag: DiagnosticBag) -> None:

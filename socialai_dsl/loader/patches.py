@@ -191,6 +191,27 @@ def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
     return edits
 
 
+def rivals_of(root: Node) -> dict[str, Node]:
+    """The strategies that a scenario names under `rivals`, each a frame."""
+    written = root.entry("rivals")
+    return written.children if written is not None and isinstance(written.children, dict) else {}
+
+
+def let_play(root: Node, rival: str) -> bool:
+    """Let the agent of a scenario follow one of its rivals; False: there is none of this name."""
+    frame, cast = rivals_of(root).get(rival), root.entry("cast")
+    agent = None if cast is None else cast.entry("agent")
+    if frame is None or agent is None or not isinstance(root.children, dict):
+        return False
+    frames = root.children.setdefault("frames", Node(frame.span, children={}))
+    for mapping, key, value in ((frames, rival, frame), (agent, "frame", Node(frame.span, rival))):
+        mapping.children = {**(mapping.children if isinstance(mapping.children, dict) else {}), key: value}
+    agent.children = {
+        str(key): value for key, value in agent.items() if key != "with"
+    }  # it fills slots of another
+    return True
+
+
 def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
     section = patch.entry("remove")
     if section is None:

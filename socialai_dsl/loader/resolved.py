@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant
+from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant, let_play, rivals_of
 from socialai_dsl.loader.reader import (
     MAX_CHAIN,
     MAX_DEPTH,
@@ -354,8 +354,9 @@ def vary(library: Library, build: Build, variant: NamePart) -> None:
     """Apply a variant to what is built: the nearest file of that name, else one for any scenario.
 
     `<X>_V.yaml` comes first, then `<R>_V.yaml` of each scenario R that X is a variant of, then `V.yaml` with
-    `of: any`; each beside the scenario, then among the shipped ones. A suite is changed only by a variant of its own,
-    and passes every variant on. What has the variant already stays as it is.
+    `of: any`; each beside the scenario, then among the shipped ones. A rival that the scenario itself names comes
+    before the last of these. A suite is changed only by a variant of its own, and passes every variant on. What has the
+    variant already stays as it is.
 
     Raises:
         ScenarioError: S503 if there is no such variant; what is wrong with its file.
@@ -372,7 +373,7 @@ def vary(library: Library, build: Build, variant: NamePart) -> None:
             _apply(library, build, patch)
     if build.kind == "suite":
         build.passed_on.append(variant)
-    elif direct is None:
+    elif direct is None and not let_play(build.tree, variant.text):
         _apply(library, build, _of_any(library, build, variant))
     _name(build, variant.text, direct)
 
@@ -441,7 +442,7 @@ def _folders(library: Library, build: Build) -> list[Path]:
 
 def _known(library: Library, build: Build) -> list[str]:
     """The variants that what is built has, sorted."""
-    names: set[str] = set()
+    names = set(rivals_of(build.tree))
     for folder in _folders(library, build):
         stems = [name.removesuffix(".yaml") for name in yaml_files(folder) if name.endswith(".yaml")]
         names.update(stem for stem in stems if _is_of_any(folder / f"{stem}.yaml"))

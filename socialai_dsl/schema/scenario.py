@@ -583,7 +583,9 @@ class OnlyThrough(Model):
 
 
 class Property(Model):
-    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `needs`, `only_through` and `knowable`."""
+    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `rival`, `needs`, `only_through` and
+    `knowable`.
+    """
 
     reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
     never: Expression | None = Field(None, description="a condition, or the name of an outcome")
@@ -591,6 +593,10 @@ class Property(Model):
     oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
     script: Literal["perceives"] | None = Field(
         None, description="the variant `oracle` acts on its perceptions alone"
+    )
+    rival: Word | None = Field(None, description="a strategy of `rivals`, which must not succeed too often")
+    at_most: Probability | None = Field(
+        None, description="for `rival`: the share of rooms that it may solve at most"
     )
     needs: Names | None = Field(None, description="members without which an agent can only guess")
     only_through: OnlyThrough | None = Field(None, description="members whose cues alone may reveal a draw")
@@ -824,6 +830,11 @@ class Scenario(Model):
     )
     check: ListOf[Property] = Field(
         (), description="properties that `socialai check` verifies; playing never reads them"
+    )
+    rivals: dict[Word, Frame] = Field(
+        default_factory=dict,
+        max_length=16,
+        description="name: a strategy that lacks the skill, as a frame for the agent; `SCENARIO+name` plays it",
     )
     probes: dict[Word, Probe] = Field(
         default_factory=dict,

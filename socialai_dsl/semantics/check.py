@@ -8,7 +8,7 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import Final, get_args
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, advice_on, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
 from socialai_dsl.semantics import (
     addressing,
@@ -77,7 +77,11 @@ from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
 
-_WITH = {"share": ("reachable", "within", "script", "needs", "knowable"), "draw": ("needs",)}
+_WITH = {
+    "share": ("reachable", "within", "script", "needs", "knowable"),
+    "draw": ("needs",),
+    "at_most": ("rival",),
+}
 """Keys that say more, and what they can be said about."""
 
 Draw = tuple[str, tuple[int, ...]]
@@ -124,6 +128,15 @@ class _Entry:
                 return replace(plan, text=text, expected=bool(entry.knowable))
             case "script":
                 return replace(plan, text=f"script: {entry.script}")
+            case "rival":
+                name, most = self._rival(place, entry.rival or ""), entry.at_most
+                if most is None:
+                    message = "`rival` needs `at_most`, the share of rooms that it may solve"
+                    hint = f"write `{{rival: {name}, at_most: 0.67}}`"
+                    raise self._findings.fail(
+                        "S105", message, self._findings.places.key_span(place), hint=hint
+                    )
+                return replace(plan, text=f"rival: {name} at most {most:g}", rival=name, share=most)
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (
@@ -177,6 +190,15 @@ class _Entry:
                 raise self._findings.no_such(name, message, span, suggestion=near)
             members += symbols.groups.get(name, (name,))
         return tuple(dict.fromkeys(members))
+
+    def _rival(self, path: DataPath, name: str) -> str:
+        rivals = self._resolver.symbols.scenario.rivals
+        if name not in rivals:
+            advice = advice_on(name, rivals, "declare it: `rivals: {" + name + ": {steps: [...]}}`")
+            raise self._findings.fail(
+                "S201", f"there is no rival `{name}`", self._findings.at(path, width=len(name)), **advice
+            )
+        return name
 
     def _let(self, path: DataPath, word: str, lets: dict[str, Drawn]) -> str:
         if f"let.{word}" not in lets:

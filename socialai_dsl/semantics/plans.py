@@ -434,7 +434,7 @@ class MemoryPlan:
 
 
 PropertyKind = Literal[
-    "reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"
+    "reachable", "never", "within", "oracle", "script", "rival", "needs", "only_through", "knowable"
 ]  # fmt: skip
 
 
@@ -446,7 +446,7 @@ class PropertyPlan:
     read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
     `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
-    what success depends on is to be `knowable`, or not to be.
+    what success depends on is to be `knowable`, or not to be. `rival`: whose share of rooms is at most `share`.
     """
 
     kind: PropertyKind
@@ -460,6 +460,7 @@ class PropertyPlan:
     members: tuple[str, ...] = ()
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
     expected: bool = True
+    rival: str = ""
 
 
 @dataclass(frozen=True, slots=True)
