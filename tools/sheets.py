@@ -149,7 +149,27 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
                 verdict: len(report.found(verdict)) for verdict in ("unsolvable", "solvable", "undecided")
             },
         }
+    if shares := rival_shares(name, rooms, seed):
+        figures["rivals"] = shares
     return figures
+
+
+def rival_shares(name: str, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any]:
+    """The success of each of a scenario's rivals."""
+    from socialai_dsl.analysis.effort import Effort
+    from socialai_dsl.analysis.properties import solved_by_script
+    from socialai_dsl.checking.loaded import LoadedScenario
+    from socialai_dsl.compilation import compile_loaded
+    from socialai_dsl.frontend import rival_of
+
+    loaded, found = _load(name), dict[str, Any]()
+    if not isinstance(loaded, LoadedScenario):
+        return found
+    for rival in loaded.scenario.rivals:
+        won = solved_by_script(compile_loaded(rival_of(loaded, rival)), Effort(rooms, seed))
+        error = float((won.mean() * (1 - won.mean()) / rooms) ** 0.5)
+        found[rival] = {"rooms": rooms, "success_rate": float(won.mean()), "success_rate_se": error}
+    return found
 
 
 def _measurements(folder: Path) -> Mapping[str, Any]:

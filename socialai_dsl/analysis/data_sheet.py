@@ -175,6 +175,8 @@ def _measured(measured: Mapping[str, Any] | None) -> list[str]:
     if script := measured.get("oracle"):
         length = f"{script['mean_length']:.1f} steps a success"
         rows.append(("own script", _share(script), length, f"{script['rooms']:,} rooms"))
+    for name, rival in measured.get("rivals", {}).items():
+        rows.append((f"rival {code(name)}", _share(rival), "", f"{rival['rooms']:,} rooms"))
     lines = ["## Measured", "", *table(("who", "success", "length", "of"), rows)]
     if script and (counts := {v: n for v, n in script["unsolved"].items() if n}):
         found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())

@@ -23,7 +23,7 @@ class Depth:
         steps: length of a shortest success in each room that can be solved, ascending.
         unsolvable: rooms without any success. undecided: rooms whose search gave up.
         unsolved: rooms that the script does not solve; None without a script.
-        rivals: of each rival, how many rooms it solves.
+        rivals: of each rival, the share of rooms that it solves.
         alone: what is possible where no NPC is seen or heard; None if there is none.
     """
 
@@ -32,7 +32,7 @@ class Depth:
     unsolvable: tuple[int, ...]
     undecided: tuple[int, ...]
     unsolved: tuple[int, ...] | None
-    rivals: dict[str, int]
+    rivals: dict[str, float]
     alone: Alone | None
 
 
@@ -40,12 +40,12 @@ def depth(trial: Trial, effort: Effort) -> Depth:
     """Search rooms, let the script play them, and try what a policy gets that knows of no NPC."""
     searching = replace(effort, clock=effort.clock.part(2))
     findings: list[Finding] = []
-    unsolved, rivals, alone = None, dict[str, int](), None
+    unsolved, rivals, alone = None, dict[str, float](), None
     with suppress(OutOfTimeError), effort.clock.limiting():
         findings = list(trial.successes(searching, "shortest successes"))
         if trial.scripted is not None:
             unsolved = tuple((~trial.solved).nonzero()[0].tolist())
-        rivals = {name: int(trial.solved_by(name).sum()) for name in trial.loaded.scenario.rivals}
+        rivals = {name: float(trial.solved_by(name).mean()) for name in trial.loaded.scenario.rivals}
         alone = without_npcs(trial.loaded, effort)
     return Depth(
         len(findings),

@@ -56,6 +56,8 @@ _HOLDS: Final = "the property holds"
 _AS_TRIED: Final = (
     " (chance during the episode, if only which way somebody turns round, was tried only in part)"
 )
+RIVAL_ROOMS: Final = 500
+"""In how many rooms a rival plays, at least."""
 _OF_ITSELF: Final = "a success comes of itself, without the agent"
 
 
@@ -92,9 +94,12 @@ class Trial:
         return solved_by_script(self.scripted, self.effort)
 
     def solved_by(self, rival: str) -> NDArray[np.bool_]:
-        """In which rooms a rival succeeds, (rooms,). Keeps to the time that limits it (`Clock.limiting`)."""
+        """In which rooms a rival succeeds, (max(rooms, RIVAL_ROOMS),): to play costs next to nothing. Keeps to the time
+        that limits it (`Clock.limiting`).
+        """
         if rival not in self._rivals:
-            self._rivals[rival] = solved_by_script(compiled(rival_of(self.loaded, rival)), self.effort)
+            more = replace(self.effort, rooms=max(self.effort.rooms, RIVAL_ROOMS))
+            self._rivals[rival] = solved_by_script(compiled(rival_of(self.loaded, rival)), more)
         return self._rivals[rival]
 
     def successes(self, effort: Effort, what: str) -> Iterator[Finding]:
@@ -252,7 +257,7 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
     rests = int((~idle).sum())
     if not rests:
-        said = f"it rests on nothing: in all of {rooms_text(effort.rooms)} a success comes of itself, without the agent"
+        said = f"it rests on nothing: in all of {rooms_text(effort.rooms)} {_OF_ITSELF}"
         return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
     if idle.any():
         said += f"; in {int(idle.sum())} of them a success comes of itself"
@@ -262,20 +267,16 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 def _rival(trial: Trial, plan: PropertyPlan) -> Report:
     """Whether a strategy that lacks the skill fails often enough."""
     assert plan.share is not None, "internal: a rival has a share"
-    won, idle = trial.solved_by(plan.rival), trial.rooms.solved_by_idling
-    rooms, count = trial.effort.rooms, int(won.sum())
-    said = f"it solves {count} of {rooms_text(rooms)}"
+    won = trial.solved_by(plan.rival)
+    said = f"it solves {won.mean():.0%} of {rooms_text(len(won))}"
     if trial.scripted is not None:
-        said += f", the scenario's own script {int(trial.solved.sum())}"
-    rests = int((~idle).sum())
-    if not rests:
-        said = (
-            f"it rests on nothing: in all of {rooms_text(rooms)} a success comes of itself, without the agent"
-        )
-    holds = rests > 0 and won.mean() <= plan.share + 1e-9
+        said += f", the scenario's own script {trial.solved.mean():.0%} of {rooms_text(len(trial.solved))}"
+    if trial.rooms.solved_by_idling.all():
+        said = f"it rests on nothing: in all of {rooms_text(trial.effort.rooms)} {_OF_ITSELF}"
+        return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
+    verdict = Verdict.HOLDS if won.mean() <= plan.share + 1e-9 else Verdict.FAILS
     against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
-    verdict = Verdict.HOLDS if holds else Verdict.FAILS
-    return Report(verdict, rooms, rooms - count, 0, against, said, rests)
+    return Report(verdict, len(won), int((~won).sum()), 0, against, said, len(won))
 
 
 def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

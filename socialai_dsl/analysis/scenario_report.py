@@ -8,6 +8,7 @@ from typing import Any, Final
 from socialai_dsl.analysis.alone import Alone
 from socialai_dsl.analysis.coverage import Coverage
 from socialai_dsl.analysis.depth import Depth
+from socialai_dsl.analysis.properties import RIVAL_ROOMS
 from socialai_dsl.analysis.reports import Report, rooms_text
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.frontend import not_ignored
@@ -173,8 +174,8 @@ def _depth(found: Depth, rooms: int) -> Iterator[str]:
         yield f"  the script solves {rooms - len(found.unsolved)} of {rooms} rooms"
         if found.unsolved:
             yield f"    not {_listed(found.unsolved)}"
-    for name, solved in found.rivals.items():
-        yield f"  the rival `{name}` solves {solved} of {rooms} rooms"
+    for name, share in found.rivals.items():
+        yield f"  the rival `{name}` solves {share:.0%} of {rooms_text(max(rooms, RIVAL_ROOMS))}"
     if found.alone is not None:
         yield from _alone(found.alone)
 

@@ -11,32 +11,37 @@ from socialai_dsl.loader.reader import shipped_folder
 from tests.quick import one_in
 
 CLAIMING = {
-    "talkitout": 3,
-    "talkitout+no_liar": 3,
+    "talkitout": 5,
+    "talkitout+no_liar": 4,
     "talkitout+unsocial": 0,  # a control: nobody is perceived
-    "diverse_exit": 2,
+    "cointhief": 2,
+    "cointhief+tags": 2,
+    "diverse_exit": 4,
     "help": 2,
     "help+as_helper": 2,
+    "showme": 2,
 }
 """How many properties are tried, `knowable` among them."""
 
 NOVEL = {
     "bargaining": 3,
-    "culprit": 3,
+    "culprit": 4,
     "fetch": 2,
-    "gossip": 2,
+    "gaze_following": 3,
+    "gossip": 4,
     "haggling": 3,
-    "implicature": 4,
+    "implicature": 6,
     "interpreter": 2,
-    "reference_game": 2,
-    "sarcasm": 3,
+    "reference_game": 5,
+    "sally_anne": 2,
+    "sarcasm": 5,
+    "second_order": 3,
     "turn_taking": 2,
     "whisper": 3,
 }
 
 CLAIMING_NOTHING = [
-    *("cointhief", "cointhief+tags", "dance", "showme", "showme+no_social"),
-    *("novel/conventions", "novel/gaze_following", "novel/sally_anne", "novel/second_order", "novel/shop"),
+    *("dance", "showme+no_social", "novel/conventions", "novel/shop"),
 ]
 SCHOOL = [
     *("apple_stealing", "apple_stealing+asocial", "boxes+alone", "doors_alone", "marbles_alone"),
