@@ -477,7 +477,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, te
         found = tuple(said_once(bag))
         return _sifted(CheckResult(name, None, None, found, dict(resolved.files), resolved, tested=tested))
     checked, scenario = _checked(resolved, bag)
-    if checked is not None:
+    if checked is not None and resolved.path.is_file():  # else there is no telling what stands beside it
         _check_claimed_script(name, checked, texts, bag)
     if scenario is not None and checked is not None and scenario.rivals:
         bag = with_findings_on_rivals(bag, resolved, scenario)

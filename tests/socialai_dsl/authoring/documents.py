@@ -146,6 +146,8 @@ def _possible(made: dict[str, Any]) -> dict[str, Any]:
                 given = [given]
             if type(count) is int and isinstance(given, list):
                 member[key] = [deepcopy(item) for item in (given * 16)[:count]] if given else ["x"] * count
+            if isinstance(count, str) and isinstance(given, list):
+                member[key] = "x"  # how many there are is not known, so what each has is not looked at
             if count is None and isinstance(given, list) and made.get("abstract") is True and not one_cell:
                 member[key] = "x"  # a file that builds on this one might say how many they are
     for part in _mappings(made):
