@@ -48,7 +48,7 @@ def shape_of(data: Any, folder: Path) -> list[str]:
         resolved = resolve(str(path), texts={path: Source("made.yaml", text)})
         match resolved.kind:
             case "scenario":
-                draft_of(resolved, bag)
+                draft_of(resolved, bag, resolved.tree.entry("tests"))
             case "npc":
                 check_npc(resolved, bag)
             case "library":
