@@ -79,7 +79,7 @@ class NetPolicy:
         self._require(len(tokens))
         if self._actor is None or len(self._actor.pairs.data) > _REMEMBERED_FRAMES:
             self._actor = Actor(self.net, tokens.shape[1])
-        images, self._seen = self.net.sight.look(images, self._seen)
+        images, self._seen = self.net.sight.look(images, tokens, self._seen)
         _, features = self._actor.see(images, tokens)
         output, self._memory = self.net.memory.step(features, self._memory)
         self._last = self.net.heads(output)

@@ -163,12 +163,14 @@ def _step(
     bootstrap = np.zeros(len(ended), np.float32)
     if config.bootstrap_timeouts and cut.any():
         final, probe = infos["final_obs"], Actor(session.actor.net, state.tokens.shape[1])
-        image, _ = probe.net.sight.look(final["image"][cut], state.seen[cut])
+        image, _ = probe.net.sight.look(final["image"][cut], final["tokens"][cut], state.seen[cut])
         values = _value(probe, state.memory[probe.move(cut)], image, final["tokens"][cut])
         bootstrap[cut] = values.cpu().numpy()
     state.seen[ended] = 0
-    state.image, state.seen = session.actor.net.sight.look(observation["image"].copy(), state.seen)
     state.tokens, state.starts = observation["tokens"].copy(), ended
+    state.image, state.seen = session.actor.net.sight.look(
+        observation["image"].copy(), state.tokens, state.seen
+    )
     state.returns += reward
     state.lengths += 1
     if session.tutor is not None:

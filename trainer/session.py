@@ -137,7 +137,7 @@ class Session:
         if tutor is not None:
             tutor.begin()
         seen = np.zeros((config.envs, net.sight.size), np.int64)
-        image, seen = net.sight.look(observation["image"].copy(), seen)
+        image, seen = net.sight.look(observation["image"].copy(), observation["tokens"], seen)
         state = State(
             image=image,
             tokens=observation["tokens"].copy(),

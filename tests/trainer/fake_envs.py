@@ -45,13 +45,14 @@ class EchoEnvs(gym.vector.VectorEnv):
         pictures=40,
         lethal=True,
         mode=_SAME,
+        voice="voice",
     ):
         self.metadata = {"autoreset_mode": mode}
         self._over = np.zeros(num_envs, np.bool_)
         self.num_envs, self.nouns, self.delay, self.limit = num_envs, nouns, delay, limit
         self.length, self.chatter, self.pictures, self.lethal = length, chatter, pictures, lethal
         high = np.broadcast_to(np.array([12, 5, 3, 3], np.uint8), (7, 7, 4))
-        self.vocabulary = ["<pad>", "<unk>", "voice", "say", *[f"word{i}" for i in range(nouns)], "la", "di"]
+        self.vocabulary = ["<pad>", "<unk>", voice, "say", *[f"word{i}" for i in range(nouns)], "la", "di"]
         self.single_observation_space = spaces.Dict(
             image=spaces.Box(np.zeros((7, 7, 4), np.uint8), high, dtype=np.uint8),
             tokens=spaces.Box(0, len(self.vocabulary) - 1, (length,), np.int16),

@@ -251,8 +251,8 @@ def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: f
     assert parts.policy_loss.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
 
 
-def played(config: RunConfig) -> tuple[Session, Any]:
-    envs = EchoEnvs(config.envs, length=8, chatter=0.4)
+def played(config: RunConfig, voice: str = "voice") -> tuple[Session, Any]:
+    envs = EchoEnvs(config.envs, length=8, chatter=0.4, voice=voice)
     session = Session.start(config, envs)
     for _ in range(2):
         rollout = collect(session)
@@ -374,11 +374,16 @@ def test_steps_get_longer_again_up_to_the_schedule(small_config: Any) -> None:
     assert rates == pytest.approx([0.7e-3, 0.875e-3, 1e-3])
 
 
-@pytest.mark.parametrize("net", ["fast", "paper", "relations"])
-def test_threads_can_share_a_network(net: str, small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("net", "voice"),
+    [("fast", "voice"), ("paper", "voice"), ("relations", "voice"), ("relations", "<Voice>")],
+)
+def test_threads_can_share_a_network(
+    net: str, voice: str, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A pass over a minibatch sets no attribute of the network or its parts, which another thread would meet."""
     config = small_config(net=net)
-    session, rollout = played(config)
+    session, rollout = played(config, voice)
     minibatch = cut_out(session, rollout, estimate_advantages(config, rollout), torch.arange(config.envs))
 
     def refuse(module: torch.nn.Module, name: str, value: object) -> None:

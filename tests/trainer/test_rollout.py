@@ -81,7 +81,9 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
     with torch.no_grad():
         for t in range(24):
             seen[rollout.starts[t].numpy()] = 0
-            envs.seen[t]["image"], seen = model.sight.look(envs.seen[t]["image"], seen)
+            envs.seen[t]["image"], seen = model.sight.look(
+                envs.seen[t]["image"], envs.seen[t]["tokens"], seen
+            )
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
             memory = emptied(memory, rollout.starts[t])
             output, memory = model.memory.step(features, memory)

@@ -11,8 +11,7 @@ from trainer.nets.base import ActorCritic, NetSpec, Precision
 from trainer.nets.fast import FastNet
 from trainer.nets.memory import Memory
 from trainer.nets.paper import PaperNet, PaperReferenceNet
-from trainer.nets.relations import RelationsNet
-from trainer.nets.speakers import SpeakersNet
+from trainer.nets.relations import RelationsNet, SpeakersNet
 
 __all__ = [
     "ActorCritic",

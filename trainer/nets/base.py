@@ -151,7 +151,7 @@ class ActorCritic(nn.Module, ABC):
         super().__init__()
         self.spec = spec
         self.reader = self.reader_class(spec.vocabulary)
-        self.sight = self.sight_class(spec.image_shape, spec.image_high)
+        self.sight = self.sight_class(spec.image_shape, spec.image_high, spec.vocabulary_size)
         self.features = features
         self.dialogue = dialogue
         self.memory: Memory = LstmMemory(features, memory_size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -107,14 +108,27 @@ class _TreeGru(torch.autograd.Function):
         return d_inputs, d_hidden.t() @ before, d_hidden.sum(0), None, None
 
 
-class DialogueEncoder(nn.Module):
-    """Embedding and GRU over the words heard so far; the last state stands for the history.
+class DialogueEncoder(nn.Module, ABC):
+    """An encoder of histories.
+
+    Attributes:
+        size: width of an encoding.
+    """
+
+    size: int
+
+    @abstractmethod
+    def forward(self, tree: PrefixTree) -> Tensor:
+        """Encode the histories of a tree, float32 (D, size), those with a shared beginning together."""
+
+
+class GruEncoder(DialogueEncoder):
+    """Embedding and GRU over the words heard so far; the last state stands for the history, zero for the empty one.
 
     Source: SocialAI 1.0's language encoder (embedding 128, GRU 128, output at the last word).
 
     Attributes:
         hidden: width of the GRU, and of the words' embedding.
-        size: width of the encoding, floats.
     """
 
     def __init__(self, vocabulary_size: int, hidden: int = 128) -> None:
@@ -124,7 +138,7 @@ class DialogueEncoder(nn.Module):
         self.gru = nn.GRU(hidden, hidden)
 
     def forward(self, tree: PrefixTree) -> Tensor:
-        """Encode the histories of a tree, (D, size), those with a shared beginning together; the empty one is zero."""
+        """See `DialogueEncoder.forward`."""
         if not len(tree.tokens):  # nothing was heard, so no weight takes part
             return self.embedding.weight.new_zeros(len(tree.leaves), self.hidden)
         w_ih, w_hh = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("weight_hh_l0")
@@ -137,8 +151,8 @@ class DialogueEncoder(nn.Module):
         return states.index_select(0, tree.leaves)
 
 
-class HeardWords(DialogueEncoder):
-    """The encoding of `DialogueEncoder`, then for each word of the vocabulary 1 if it is in the history, else 0.
+class HeardWords(GruEncoder):
+    """The encoding of `GruEncoder`, then for each word of the vocabulary 1 if it is in the history, else 0.
 
     A recurrent state forgets a word while others are said after it, and has to learn not to. Here nothing is forgotten,
     and what order means is left to the recurrent state.

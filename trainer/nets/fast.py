@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Literal
+
 import torch
 from torch import Tensor, nn
 
 from trainer.nets.base import ActorCritic, NetSpec
 from trainer.nets.dialogue import HeardWords
+from trainer.nets.lines import Together
 
 
 class Cells:
@@ -24,6 +28,23 @@ class Cells:
             code = code * size + cells[..., channel]
         codes, self.kind_of = torch.unique(code, return_inverse=True)
         self.kinds = torch.stack(torch.unravel_index(codes, sizes), 1)
+        self._channel = torch.arange(len(sizes), device=images.device)
+
+    @cached_property
+    def counts(self) -> Tensor:
+        """How many cells of each image are of each kind, (I, C) float; three stands for more."""
+        counts = torch.zeros(len(self.kind_of), len(self.kinds), device=self.kinds.device)
+        return counts.scatter_add_(1, self.kind_of, torch.ones_like(self.kind_of, dtype=counts.dtype)).clamp_(
+            max=3
+        )
+
+    def summed(self, table: Tensor, dim: Literal[0, 1] = 0) -> Tensor:
+        """For each kind the sum of a table's entries for the code in each channel.
+
+        `table` is (..., channels, 256, ...), channels being dimension `dim`; the sums are (..., C, ...).
+        """
+        entries = table[self._channel, self.kinds] if dim == 0 else table[:, self._channel, self.kinds]
+        return entries.sum(dim + 1)
 
 
 class FastNet(ActorCritic):
@@ -44,8 +65,10 @@ class FastNet(ActorCritic):
     word_rows = (*ActorCritic.word_rows, "mentions")
     dialogue: HeardWords
 
-    def __init__(self, spec: NetSpec, width: int = 128) -> None:
-        super().__init__(spec, width, HeardWords(spec.vocabulary_size))
+    def __init__(
+        self, spec: NetSpec, width: int = 128, dialogue: HeardWords | Together | None = None
+    ) -> None:
+        super().__init__(spec, width, dialogue or HeardWords(spec.vocabulary_size))
         height, ahead, channels = self.sight.shape
         # 256 values per channel, so that scenarios with other bounds share the weights' shape.
         self.channels = nn.Parameter(torch.randn(channels, 256, self.kind_size) * channels**-0.5)
@@ -63,13 +86,14 @@ class FastNet(ActorCritic):
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         used, history = torch.unique(text_index, return_inverse=True)
         state, heard = self.dialogue.split(text.index_select(0, used))  # (S, hidden), (S, V)
-        return self.read(prepared, state, heard, self.words(state), image_index, history)
+        mentioned = heard @ prepared.summed(self.mentions, 1)  # (S, C)
+        return self.read(prepared, state, mentioned, self.words(state), image_index, history)
 
     def read(
         self,
         prepared: Cells,
         state: Tensor,
-        heard: Tensor,
+        mentioned: Tensor,
         said: Tensor,
         image_index: Tensor,
         history: Tensor,
@@ -79,14 +103,12 @@ class FastNet(ActorCritic):
         Args:
             prepared: see `prepare`.
             state: (S, hidden), which scales and shifts the cells.
-            heard: (S, V), how much each word scales the cells that it mentions.
+            mentioned: (S, C), how much each kind of cell is scaled.
             said: (S, width), added to what is seen.
             image_index: int64 (P,).
             history: int64 (P,).
         """
-        channel = torch.arange(self.channels.shape[0], device=heard.device)
-        kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
-        mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2)  # (S, C)
+        kinds = prepared.summed(self.channels)  # (C, kind_size)
         scale, shift = self.film(state)[:, None].chunk(2, 2)
         scale = scale + mentioned[:, :, None]  # (S, C, kind_size)
         read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))  # (S, C, kind_size)

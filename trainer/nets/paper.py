@@ -7,7 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from trainer.nets.base import ActorCritic, NetSpec, unit_row_linear
-from trainer.nets.dialogue import DialogueEncoder
+from trainer.nets.dialogue import GruEncoder
 from trainer.nets.reading import LetterReader
 
 
@@ -70,7 +70,7 @@ class PaperNet(ActorCritic):
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
         words = max(len(self.reader_class(spec.vocabulary).words), LetterReader.CAPACITY)
-        super().__init__(spec, width, DialogueEncoder(words))
+        super().__init__(spec, width, GruEncoder(words))
         self.image_conv = nn.Sequential(
             _Conv(spec.image_shape[2], width),
             _norm(width, self.batch_norm),

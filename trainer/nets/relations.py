@@ -2,136 +2,151 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+from typing import Final
 
 import torch
 from torch import Tensor, nn
 
+from socialai_dsl.vocabulary import COLORS
 from trainer.nets.base import NetSpec
-from trainer.nets.dialogue import HeardWords, PrefixTree
+from trainer.nets.dialogue import HeardWords
 from trainer.nets.fast import Cells, FastNet
+from trainer.nets.lines import HeardOrder, HeardSpeakers, Together, marks, word_weights
+from trainer.nets.naming import NamingSight
 from trainer.nets.sight import MapSight, Sight
 
-
-class HeardLines(HeardWords):
-    """The encoding of `HeardWords`, then sums over the words in their order.
-
-    Every word adds the product of its own embedding with that of the word before it, and one with that of its place. So
-    the sum depends on the order of the words, and the gradient reaches each word from the first update on, however much
-    was said since.
-    """
-
-    PLACES = 64
-
-    def __init__(self, vocabulary: Sequence[str], hidden: int = 128, order: int = 128) -> None:
-        words = len(vocabulary)
-        super().__init__(words, hidden)
-        self.order = order
-        self.pairs = nn.Parameter(torch.randn(words, 2, order) * 0.6)  # as the word before, and as the word
-        self.placed = nn.Parameter(torch.randn(words, order) * 0.6)
-        self.places = nn.Parameter(torch.randn(self.PLACES, order) * 0.6)
-        self.size = hidden + words + order
-
-    def parts(self, encodings: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Encodings (D, size) as recurrent states (D, hidden), the words heard (D, V), and sums over the order
-        (D, order).
-        """
-        state, heard, order = torch.split(encodings, [self.hidden, len(self.pairs), self.order], 1)
-        return state, heard, order
-
-    def forward(self, tree: PrefixTree) -> Tensor:
-        """See `DialogueEncoder.forward`."""
-        base = super().forward(tree)
-        words = torch.cat((tree.tokens.new_zeros(1), tree.tokens))  # the last of each state
-        before = self.pairs[words[tree.parents], 0] * (tree.parents > 0)[:, None]
-        depth = torch.repeat_interleave(torch.diff(torch.tensor(tree.offsets, device=words.device)))
-        added = before * self.pairs[tree.tokens, 1]
-        added = added + self.places[depth.clamp(max=self.PLACES - 1)] * self.placed[tree.tokens]
-        sums = [added.new_zeros(1, self.order)]
-        for first, behind in pairwise(tree.offsets):
-            level = tree.parents[first:behind] - (first - len(sums[-1]) + 1)
-            sums.append(sums[-1].index_select(0, level) + added[first:behind])
-        return torch.cat((base, torch.cat(sums)[tree.leaves]), 1)
+_COLOR: Final = 1
+"""The channel of colours."""
 
 
 class RelationsNet(FastNet):
-    """`FastNet` with relations: what is seen is compared, words are taken together, cells are read twice.
+    """`FastNet` with relations: what is seen is compared, words are taken together.
 
     Each part makes a combination of two perceptions, which a network would first have to find without any gradient on
     the way, a perception of its own. A subclass may have fewer of them, see `parts`:
 
-    * `map`: things in view are compared with those seen before (`MapSight`).
-    * `order`: a layer reads the words in their order (`HeardLines`).
-    * `products`: products of two sums over the words heard say what words mean together, as a tone and a remark do.
-    * `again`: what was seen and said decides what is looked for in a second reading of the cells.
+    * `map`: things in view are compared with those seen before, and what people face is told (`MapSight`).
+    * `names`: with `map`, things are called by what was said while they looked so (`NamingSight`).
+    * `kinds`: what each kind of cell in view means wherever it is, through a layer of its own.
+    * `order`: a layer reads the words in their order (`HeardOrder`).
+    * `pairs`: products of two sums over the words heard say what words mean together, as a tone and a remark do.
+    * `where`: the places of what was mentioned are read by themselves, once for each of the products of `pairs`.
+    * `speakers`: where tokens mark who speaks, a word counts in its speaker's last line, and by how far the speaker is
+      trusted: any speaker, and one whom another has named (`HeardSpeakers`). So one who says something else each time
+      does not light up everything.
+
+    Two biases are given by hand: the names of colours (`lexicon`, which a subclass can set to 0), and that `trust` may
+    depend on being named by another speaker. What follows from either is learnt.
 
     Attributes:
-        forms: (V, 2, F), the two sums of each product.
-        again: (V, channels, 256, G), how much a word scales the cells that have a code in the second reading; each
-            part of it has a gate.
+        lexicon: how much the name of a colour scales the cells of that colour at first; 0: to be learnt.
+        partners: (V, SUMS, GATES), with `forms`, (V, SUMS), the sums whose products are the gates.
+        trust: of a speaker's last line, and how much more of one whom another has named.
+        lines: (V, S, width), a layer over the words by who said them.
     """
 
-    parts: frozenset[str] = frozenset(("map", "order", "products", "again"))
-    FORMS, GATES = 32, 4
-    sight_class: type[Sight] = MapSight
-    word_rows = (*FastNet.word_rows, "again", "forms", "dialogue.pairs", "dialogue.placed")
-    dialogue: HeardLines
+    parts: frozenset[str] = frozenset(("map", "names", "kinds", "order", "pairs", "where", "speakers"))
+    lexicon = 2.0
+    SUMS, GATES, LOOKS = 64, 8, 64
+    STRESS = 6.0  # of what was mentioned against all else in view
+    SWAY = 5.0  # times `trust`: two numbers that decide about every word have to move faster than the weights of one
+    sight_class: type[Sight] = NamingSight
+    _WORD_ROWS = (
+        *("mentions", "lines", "forms", "partners", "dialogue.each.0.embedding.weight"),
+        *("dialogue.each.0.summed", "dialogue.each.1.pairs", "dialogue.each.1.placed"),
+    )
+    dialogue: Together  # type: ignore[assignment]
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
-        if "map" not in self.parts:
-            self.sight_class = Sight
-        super().__init__(spec, width)
-        self.dialogue = HeardLines(spec.vocabulary)
-        words, k = spec.vocabulary_size, self.kind_size
-        if "order" in self.parts:
-            read = nn.Linear(self.dialogue.order, 256), nn.ReLU(), nn.Linear(256, width), nn.ReLU()
-            self.past = nn.Sequential(nn.ReLU(), *read)
-        if "products" in self.parts:
-            self.forms = nn.Parameter(torch.randn(words, 2, self.FORMS) * 0.4)
-            self.meant = nn.Linear(self.FORMS, width)
-            self.meaning = nn.Linear(self.FORMS, 1 + self.GATES, bias=False)
-            nn.init.zeros_(self.meaning.weight)
-        if "again" in self.parts:
-            self.think = nn.Sequential(
-                nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU()
+        sight = NamingSight if "names" in self.parts else MapSight
+        self.sight_class = sight if "map" in self.parts else Sight
+        words, order = spec.vocabulary_size, HeardOrder(spec.vocabulary_size)
+        self.speakers = len(marks(spec.vocabulary)) if "speakers" in self.parts else 0
+        heard = HeardSpeakers(spec.vocabulary) if self.speakers else HeardWords(words)
+        super().__init__(spec, width, Together(heard, *([order] if "order" in self.parts else [])))
+        if self.speakers:
+            self.trust = nn.Parameter(torch.tensor([1.0, 0.0]) / self.SWAY)
+            self.lines = nn.Parameter(word_weights(words, self.speakers, width))
+            self.chosen = nn.Linear(self.speakers, width, bias=False)
+        if "kinds" in self.parts:
+            self.looks = nn.Parameter(
+                torch.randn(len(self.channels), 256, self.LOOKS) * len(self.channels) ** -0.5
             )
-            self.gate = nn.Linear(width, 2 * k + self.GATES)
-            self.again = nn.Parameter(torch.zeros(words, len(self.channels), 256, self.GATES))
-            self.second = nn.Linear(self.cells.in_features, width)
-            self.join = nn.Linear(2 * width, width)
+            self.alone = nn.Linear(self.LOOKS, width)
+            self.together = nn.Linear(width, width)
+        if "order" in self.parts:
+            read = nn.Linear(order.size, 256), nn.ReLU(), nn.Linear(256, width), nn.ReLU()
+            self.past = nn.Sequential(nn.ReLU(), *read)
+        if "pairs" in self.parts:
+            self.forms = nn.Parameter(torch.randn(words, self.SUMS) * self.SUMS**-0.5)
+            self.partners = nn.Parameter(torch.randn(words, self.SUMS, self.GATES) * 0.05)
+            self.meant = nn.Linear(self.GATES, width)
+        if "where" in self.parts:
+            height, ahead = spec.image_shape[:2]
+            self.where = nn.Linear(height * ahead, self.GATES * width, bias=False)
+            bound = (height * ahead * self.GATES) ** -0.5
+            nn.init.uniform_(self.where.weight, -bound, bound)
+        with torch.no_grad():
+            for word, name in enumerate(spec.vocabulary):
+                if name in COLORS:
+                    self.mentions[word, _COLOR, COLORS.index(name)] = self.lexicon
+        own = dict(self.named_parameters())
+        self.word_rows = tuple(name for name in self._WORD_ROWS if name in own)
 
     def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         used, history = torch.unique(text_index, return_inverse=True)
-        state, heard, order = self.dialogue.parts(text.index_select(0, used))  # (S, ...) each
-        gates = heard.new_zeros(len(heard), 1 + self.GATES)
-        spoken, past = self.words(state), heard.new_zeros(len(heard), self.features)  # (S, width)
+        encodings, *order = self.dialogue.split(text.index_select(0, used))  # (S, ...) each
+        state, heard, scales, spoken = self._heard(encodings)
+        mentioned = scales @ prepared.summed(self.mentions, 1)  # (S, C)
+        features = self.read(prepared, state, mentioned, spoken, image_index, history)
+        if "kinds" in self.parts:
+            looks = torch.relu(self.alone(torch.relu(prepared.summed(self.looks))))  # (C, width)
+            looks = torch.relu(self.together(prepared.counts @ looks))  # (I, width)
+            features = features + looks.index_select(0, image_index)
+        past, gates = heard.new_zeros(len(heard), self.features), heard.new_ones(len(heard), self.GATES)
         if "order" in self.parts:
-            past = past + self.past(order)
-        if "products" in self.parts:
-            forms = torch.einsum("sv,vaf->saf", heard, self.forms).prod(1)  # (S, FORMS)
-            gates, past = self.meaning(forms), past + torch.relu(self.meant(forms))
-        channel = torch.arange(len(self.channels), device=text.device)
-        kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
-        mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2) * (1 + gates[:, :1])  # (S, C)
-        scale, shift = self.film(state)[:, None].chunk(2, 2)
-        scale = scale + mentioned[:, :, None]  # (S, C, kind_size)
-        read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))
-        kind_of = prepared.kind_of.index_select(0, image_index)  # (P, cells)
-        rows = (history[:, None] * len(kinds) + kind_of).flatten()
-        cells = read.flatten(0, 1).index_select(0, rows).view(len(kind_of), -1)
-        first, past = torch.relu(self.cells(cells) + spoken[history]), past[history]
-        if "again" not in self.parts:
-            return first + past
-        thought = self.think(torch.cat((first, past), 1))  # (P, width)
-        scale, shift, weights = self.gate(thought).split((self.kind_size, self.kind_size, self.GATES), 1)
-        weights = torch.tanh(weights + gates[history, 1:])  # (P, GATES)
-        named_again = self.again[:, channel, prepared.kinds].sum(2)  # (V, C, GATES)
-        again = torch.einsum("sv,vcg->scg", heard, named_again)  # (S, C, GATES)
-        found = again.flatten(0, 1).index_select(0, rows).view(*kind_of.shape, -1)  # (P, cells, GATES)
-        looked_for = (found * weights[:, None]).sum(2, keepdim=True)
-        seen = kinds.index_select(0, kind_of.flatten()).view(*kind_of.shape, -1)
-        seen = torch.relu(seen * (1 + scale[:, None] + looked_for) + shift[:, None])
-        second = torch.relu(self.second(seen.flatten(1)))
-        return torch.relu(self.join(torch.cat((first + thought, second), 1))) + past
+            past = past + self.past(*order)
+        if "pairs" in self.parts:
+            partners = (heard @ self.partners.flatten(1)).view(-1, self.SUMS, self.GATES)
+            gates = torch.tanh(torch.einsum("sf,sfg->sg", heard @ self.forms, partners))
+            past = past + torch.relu(self.meant(gates))
+        if "where" in self.parts:
+            kind_of = prepared.kind_of.index_select(0, image_index)  # (P, cells)
+            rows = (history[:, None] * mentioned.shape[1] + kind_of).flatten()
+            found = self.STRESS * mentioned.flatten().index_select(0, rows).view_as(kind_of)
+            ways = self.where(found).view(len(found), self.GATES, -1)  # (P, GATES, width)
+            features = features + torch.relu(torch.einsum("pg,pgw->pw", gates.index_select(0, history), ways))
+        return features + past.index_select(0, history)
+
+    def _heard(self, encodings: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Of encodings (S, size) the states (S, hidden), the words heard (S, V), how much each scales the cells that it
+        mentions (S, V), and what is added to what is seen (S, width).
+        """
+        heard = self.dialogue.each[0]
+        if isinstance(heard, HeardWords):
+            state, words = heard.split(encodings)
+            return state, words, words, self.words(state)
+        assert isinstance(heard, HeardSpeakers)
+        state, said, last, named = heard.parts(encodings)
+        trust = self.SWAY * self.trust
+        scales = torch.einsum("sn,snv->sv", trust[0] + trust[1] * named, last)
+        spoken = self.words(state) + self.chosen(named) + torch.einsum("snv,vnw->sw", said, self.lines)
+        return state, said.amax(1), scales, spoken
+
+
+class SpeakersNet(RelationsNet):
+    """`RelationsNet` with nothing but who said what, and whose word counts; it needs marked lines.
+
+    From the reward alone it learns what `RelationsNet` with all of its parts was not seen to learn.
+    """
+
+    parts = frozenset(("speakers",))
+
+    def __init__(self, spec: NetSpec, width: int = 128) -> None:
+        if not marks(spec.vocabulary):
+            raise ValueError(
+                "net: speakers needs to know who speaks, and no token marks it; play the scenario with +marked, or set "
+                "`observe: {lines: marked}`"
+            )
+        super().__init__(spec, width)

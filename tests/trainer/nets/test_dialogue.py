@@ -6,13 +6,13 @@ import torch
 from torch import Tensor
 
 from tests.trainer.plain import encode
-from trainer.nets.dialogue import DialogueEncoder, HeardWords, prefix_tree
+from trainer.nets.dialogue import DialogueEncoder, GruEncoder, HeardWords, prefix_tree
 
 
 @pytest.fixture
 def encoder() -> DialogueEncoder:
     torch.manual_seed(0)
-    return DialogueEncoder(20, 16).double()
+    return GruEncoder(20, 16).double()
 
 
 def conversations(count: int, length: int) -> np.ndarray:

@@ -1,24 +1,28 @@
 """What the network `relations` hears agrees with reading histories from their first word."""
 
+import numpy as np
 import pytest
 import torch
 
 from tests.trainer.nets.test_dialogue import conversations, encode_one_by_one, encode_tree
 from trainer.nets import NetSpec
-from trainer.nets.dialogue import prefix_tree
-from trainer.nets.relations import HeardLines, RelationsNet
+from trainer.nets.dialogue import HeardWords, prefix_tree
+from trainer.nets.fast import Cells
+from trainer.nets.lines import HeardOrder, Together
+from trainer.nets.naming import NamingSight
+from trainer.nets.relations import RelationsNet
 from trainer.nets.sight import MapSight, Sight
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
 
 
 @pytest.fixture
-def encoder() -> HeardLines:
+def encoder() -> Together:
     torch.manual_seed(0)
-    return HeardLines(WORDS, 16, 24).double()
+    return Together(HeardWords(len(WORDS), 16), HeardOrder(len(WORDS), 24)).double()
 
 
-def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: HeardLines) -> None:
+def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: Together) -> None:
     rows = conversations(12, 12)
     plain, tree = encode_one_by_one(encoder, rows), encode_tree(encoder, rows)
     assert torch.allclose(plain, tree, rtol=0, atol=1e-12)
@@ -31,18 +35,83 @@ def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: HeardLines
         assert torch.allclose(one, other, rtol=0, atol=1e-12), name
 
 
-class Fewer(RelationsNet):
-    parts = frozenset(("order",))
+class Mapless(RelationsNet):
+    parts = frozenset(("order", "speakers"))
 
 
-@pytest.mark.parametrize(("net", "sight"), [(RelationsNet, MapSight), (Fewer, Sight)])
-def test_a_subclass_may_have_fewer_parts(net: type[RelationsNet], sight: type[Sight]) -> None:
-    made = net(NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), WORDS))
+class Nameless(RelationsNet):
+    parts = RelationsNet.parts - {"names", "speakers"}
+
+
+UNMARKED = tuple(word for word in WORDS if word[:1] != "<" or word in ("<pad>", "<unk>"))
+
+
+@pytest.mark.parametrize("vocabulary", [WORDS, UNMARKED])
+@pytest.mark.parametrize(
+    ("net", "sight"), [(RelationsNet, NamingSight), (Nameless, MapSight), (Mapless, Sight)]
+)
+def test_every_weight_of_the_parts_that_a_network_has_learns(
+    net: type[RelationsNet], sight: type[Sight], vocabulary: tuple[str, ...]
+) -> None:
+    made = net(NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), vocabulary))
     assert type(made.sight) is sight
-    assert hasattr(made, "forms") == (net is RelationsNet)
-    images = torch.zeros(3, *made.sight.shape, dtype=torch.uint8)
-    text = made.dialogue(prefix_tree(conversations(2, 12)))
+    assert hasattr(made, "forms") == ("pairs" in net.parts)
+    assert hasattr(made, "trust") == ("speakers" in net.parts and vocabulary is WORDS)
+    images = torch.ones(3, *made.sight.shape, dtype=torch.uint8)
+    rows = conversations(2, 12)
+    text = made.dialogue(prefix_tree(rows * 2 + (rows > 0)))
     index = torch.arange(len(text))
     found = made.perceive(made.prepare(images), text, index % 3, index)
     assert found.shape == (len(text), made.features)
     found.sum().backward()  # type: ignore[no-untyped-call]
+    for name, value in made.named_parameters():
+        assert value.grad is not None or name.split(".")[0] in ("memory", "heads"), name
+    rows_of_words = dict(made.named_parameters())
+    assert all(len(rows_of_words[name]) == len(vocabulary) for name in made.word_rows)
+
+
+def test_the_name_of_a_colour_scales_its_cells_at_first_unless_it_has_to_be_learnt() -> None:
+    class Learner(RelationsNet):
+        lexicon = 0.0
+
+    spec = NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), WORDS)
+    for net, scaled in ((RelationsNet(spec), {("red", 0), ("blue", 2)}), (Learner(spec), set())):
+        found = {(WORDS[word], int(code)) for word, channel, code in net.mentions.nonzero() if channel == 1}
+        assert found == scaled
+        assert int((net.mentions != 0).sum()) == len(scaled)
+
+
+def test_kinds_of_cells_are_counted_and_their_entries_summed() -> None:
+    images = torch.zeros(2, 7, 7, 2, dtype=torch.uint8)
+    images[0, 0, 0] = torch.tensor([3, 1])
+    images[1, :2, 0] = torch.tensor([3, 1])
+    cells = Cells(images, (4, 2))
+    assert cells.kinds.tolist() == [[0, 0], [3, 1]]
+    assert cells.counts.tolist() == [[3, 1], [3, 2]], "three stands for more"
+    table = torch.randn(2, 256, 5)
+    assert torch.equal(cells.summed(table)[1], table[0, 3] + table[1, 1])
+    assert torch.equal(cells.summed(table[None], 1)[0], cells.summed(table))
+
+
+def test_a_mention_is_read_where_it_is_and_by_what_words_mean_together() -> None:
+    """Two histories mention the same colour; another word in one of them turns what the mention means."""
+
+    class Where(RelationsNet):
+        parts = frozenset(("pairs", "where"))
+
+    torch.manual_seed(0)
+    net = Where(NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), UNMARKED))
+    for table in (net.words, net.film, net.cells, net.meant):  # what does not depend on the place is silent
+        torch.nn.init.zeros_(table.weight)
+    rows = [["red", "yes"], ["red", "no"], ["yes"]]
+    text = net.dialogue(
+        prefix_tree(np.array([[UNMARKED.index(word) for word in row] + [0] * (4 - len(row)) for row in rows]))
+    )
+    images = torch.zeros(2, 7, 7, 4, dtype=torch.uint8)
+    images[..., 1] = 5
+    images[0, 1, 1], images[1, 5, 1] = torch.tensor([4, 0, 1, 0]), torch.tensor([4, 0, 1, 0])  # a red door
+    index = torch.arange(6)
+    left, right = net.perceive(net.prepare(images), text, index // 3, index % 3).view(2, 3, -1)
+    assert not torch.allclose(left[0], left[1])
+    assert not torch.allclose(left[0], right[0])
+    assert torch.allclose(left[2], right[2]), "nothing was mentioned"

@@ -1,14 +1,13 @@
-"""The network `speakers` knows who said what, and what follows from it."""
+"""Where lines are marked, the networks `relations` and `speakers` know who said what, and what follows from it."""
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from tests.trainer.nets.test_dialogue import conversations
 from trainer.nets import NetSpec, SpeakersNet
 from trainer.nets.dialogue import prefix_tree
-from trainer.nets.speakers import HeardSpeakers
+from trainer.nets.lines import HeardSpeakers
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Old Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
 
@@ -50,8 +49,9 @@ def test_words_before_the_first_mark_are_nobody_s(encoder: HeardSpeakers) -> Non
 
 
 def test_a_scenario_whose_lines_are_not_marked_is_refused() -> None:
+    words = tuple(word for word in WORDS if word[:1] != "<" or word in ("<pad>", "<unk>"))
     with pytest.raises(ValueError, match=r"play the scenario with \+marked"):
-        HeardSpeakers([word for word in WORDS if word[:1] != "<" or word in ("<pad>", "<unk>")])
+        SpeakersNet(NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), words))
 
 
 def test_what_a_named_speaker_said_last_scales_the_cells_it_mentions() -> None:
@@ -61,7 +61,7 @@ def test_what_a_named_speaker_said_last_scales_the_cells_it_mentions() -> None:
     net = SpeakersNet(spec)
     with torch.no_grad():
         net.trust.copy_(torch.tensor([0.0, 0.2]))
-        for weights in (net.lines, net.dialogue.summed, net.chosen.weight):
+        for weights in (net.lines, net.dialogue.get_parameter("each.0.summed"), net.chosen.weight):
             weights.zero_()
     lines = {
         "nothing": [],
@@ -78,17 +78,3 @@ def test_what_a_named_speaker_said_last_scales_the_cells_it_mentions() -> None:
     assert torch.equal(nothing, unnamed)
     assert torch.equal(nothing, earlier)
     assert not torch.allclose(nothing, named)
-
-
-def test_every_weight_learns() -> None:
-    net = SpeakersNet(NetSpec((4, 2, 2, 3), (7, 7, 4), (11, 5, 2, 3), WORDS))
-    text = net.dialogue(prefix_tree(conversations(4, 12) * 2 + (conversations(4, 12) > 0)))
-    images = torch.ones(3, 7, 7, 4, dtype=torch.uint8)
-    index = torch.arange(len(text))
-    found = net.perceive(net.prepare(images), text, index % 3, index)
-    assert found.shape == (len(text), net.features)
-    found.sum().backward()  # type: ignore[no-untyped-call]
-    weights = {
-        name: value for name, value in net.named_parameters() if name.split(".")[0] not in ("memory", "heads")
-    }
-    assert all(value.grad is not None for value in weights.values())

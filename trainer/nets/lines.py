@@ -1,21 +1,68 @@
-"""The network `speakers`: who said what, and whose word counts."""
+"""Encoders of the dialogue that keep what a recurrent state blurs: the order of the words, and who said them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import sqrt
-from typing import Final
 
 import torch
 from torch import Tensor, nn
 
-from socialai_dsl.vocabulary import COLORS, words
-from trainer.nets.base import NetSpec
-from trainer.nets.dialogue import DialogueEncoder, PrefixTree
-from trainer.nets.fast import Cells, FastNet
+from socialai_dsl.vocabulary import words
+from trainer.nets.dialogue import DialogueEncoder, HeardWords, PrefixTree
 
-_COLOR: Final = 1
-"""The channel of colours."""
+
+class Together(DialogueEncoder):
+    """The encodings of several side by side; what scales the cells is the state of the first."""
+
+    def __init__(self, first: HeardWords | HeardSpeakers, *others: DialogueEncoder) -> None:
+        super().__init__()
+        self.hidden = first.hidden
+        self.each = nn.ModuleList((first, *others))
+        self._sizes = [first.size, *(other.size for other in others)]
+        self.size = sum(self._sizes)
+
+    def split(self, encodings: Tensor) -> tuple[Tensor, ...]:
+        """Encodings (D, size) as those of each, (D, its size)."""
+        return torch.split(encodings, self._sizes, 1)
+
+    def forward(self, tree: PrefixTree) -> Tensor:
+        """See `DialogueEncoder.forward`."""
+        return torch.cat([one(tree) for one in self.each], 1)
+
+
+class HeardOrder(DialogueEncoder):
+    """Sums over the words in their order.
+
+    Every word adds the product of its own embedding with that of the word before it, and one with that of its place. So
+    the sum depends on the order of the words, and the gradient reaches each word from the first update on, however much
+    was said since.
+    """
+
+    PLACES = 64
+
+    def __init__(self, vocabulary_size: int, size: int = 128) -> None:
+        super().__init__()
+        self.size = size
+        self.pairs = nn.Parameter(
+            torch.randn(vocabulary_size, 2, size) * 0.6
+        )  # as the word before, and as the word
+        self.placed = nn.Parameter(torch.randn(vocabulary_size, size) * 0.6)
+        self.places = nn.Parameter(torch.randn(self.PLACES, size) * 0.6)
+
+    def forward(self, tree: PrefixTree) -> Tensor:
+        """See `DialogueEncoder.forward`."""
+        words = torch.cat((tree.tokens.new_zeros(1), tree.tokens))  # the last of each state
+        before = self.pairs[words[tree.parents], 0] * (tree.parents > 0)[:, None]
+        depth = torch.repeat_interleave(torch.diff(torch.tensor(tree.offsets, device=words.device)))
+        added = before * self.pairs[tree.tokens, 1]
+        added = added + self.places[depth.clamp(max=self.PLACES - 1)] * self.placed[tree.tokens]
+        sums = [added.new_zeros(1, self.size)]
+        for first, behind in pairwise(tree.offsets):
+            level = tree.parents[first:behind] - (first - len(sums[-1]) + 1)
+            sums.append(sums[-1].index_select(0, level) + added[first:behind])
+        return torch.cat(sums)[tree.leaves]
 
 
 class HeardSpeakers(DialogueEncoder):
@@ -32,19 +79,12 @@ class HeardSpeakers(DialogueEncoder):
     """
 
     def __init__(self, vocabulary: Sequence[str], hidden: int = 128) -> None:
-        nn.Module.__init__(self)
-        size = len(vocabulary)
-        # No word of a text begins so; the first two ids are padding and the unknown word.
-        marks = [number for number, word in enumerate(vocabulary) if number > 1 and word[:1] == "<"]
-        if not marks:
-            raise ValueError(
-                "net: speakers needs to know who speaks, and no token marks it; play the scenario with +marked, or set "
-                "`observe: {lines: marked}`"
-            )
+        super().__init__()
+        size, found = len(vocabulary), marks(vocabulary)
         ids = {word: number for number, word in enumerate(vocabulary)}
-        self.hidden, self.speakers = hidden, len(marks)
+        self.hidden, self.speakers = hidden, len(found)
         speaker_of, named = torch.full((2, size), -1).unbind()
-        for speaker, mark in enumerate(marks):
+        for speaker, mark in enumerate(found):
             speaker_of[mark] = speaker
             named[[ids[word] for word in words(vocabulary[mark])[-1:] if word in ids]] = speaker
         self.speaker_of: Tensor
@@ -93,47 +133,9 @@ class HeardSpeakers(DialogueEncoder):
         return said[:, :nobody], last[:, :nobody], named[:, :nobody]
 
 
-class SpeakersNet(FastNet):
-    """`FastNet`, where a word counts by who said it.
-
-    A word scales the cells that have a code (`mentions`) only in its speaker's last line, and by how far the speaker is
-    trusted: any speaker, and one whom another has named. So one who says something else each time does not light up
-    everything.
-
-    Two biases are given by hand: the names of colours (`lexicon`, which a subclass can set to 0), and that `trust` may
-    depend on being named by another speaker. What follows from either is learnt.
-
-    Attributes:
-        lexicon: how much the name of a colour scales the cells of that colour at first; 0: to be learnt.
-        trust: of a speaker's last line, and how much more of one whom another has named.
-        lines: (V, S, width), a layer over the words by who said them.
-    """
-
-    lexicon = 2.0
-    SWAY = 5.0  # times `trust`: two numbers that decide about every word have to move faster than the weights of one
-    word_rows = ("mentions", "lines", "dialogue.summed")
-    dialogue: HeardSpeakers  # type: ignore[assignment]
-
-    def __init__(self, spec: NetSpec, width: int = 128) -> None:
-        super().__init__(spec, width)
-        self.dialogue = HeardSpeakers(spec.vocabulary)
-        self.trust = nn.Parameter(torch.tensor([1.0, 0.0]) / self.SWAY)
-        self.lines = nn.Parameter(word_weights(spec.vocabulary_size, self.dialogue.speakers, width))
-        self.chosen = nn.Linear(self.dialogue.speakers, width, bias=False)
-        ids = {word: number for number, word in enumerate(spec.vocabulary)}
-        with torch.no_grad():
-            for code, color in enumerate(COLORS):
-                if color in ids:
-                    self.mentions[ids[color], _COLOR, code] = self.lexicon
-
-    def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
-        """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
-        used, history = torch.unique(text_index, return_inverse=True)
-        state, said, last, named = self.dialogue.parts(text.index_select(0, used))  # (S, ...) each
-        trust = self.SWAY * self.trust
-        heard = torch.einsum("sn,snv->sv", trust[0] + trust[1] * named, last)
-        spoken = self.words(state) + self.chosen(named) + torch.einsum("snv,vnw->sw", said, self.lines)
-        return self.read(prepared, state, heard, spoken, image_index, history)
+def marks(vocabulary: Sequence[str]) -> list[int]:
+    """The tokens that mark who speaks; no word of a text begins as they do, and the first two ids are no words."""
+    return [number for number, word in enumerate(vocabulary) if number > 1 and word[:1] == "<"]
 
 
 def word_weights(words: int, speakers: int, width: int) -> Tensor:
