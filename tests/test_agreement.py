@@ -87,7 +87,6 @@ def test_agreement(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem)
-def test_agreement_over_a_thousand_episodes(name: str) -> None:
-    agree(name, 1000, seed=12)
+def test_agreement_over_a_hundred_episodes(name: str) -> None:
+    agree(name, 100, seed=12)

@@ -91,6 +91,7 @@ def perceived(scripted: LoadedScenario, rooms: int, seed: int) -> PerceptionResu
     program = compiled(scripted)
     pairs, peeks = _in_twins(program, scripted.checked, rooms, seed)
     groups, divisions = (0, []) if _draws_itself(scripted.checked) else divided(program, rooms, seed)
+    divisions.sort(key=lambda one: (one.rooms, one.step))
     return PerceptionResult(pairs, tuple(peeks), groups, tuple(divisions))
 
 

@@ -1,5 +1,6 @@
 """What was found out about a scenario by trying it, as lines for people, objects for tools, and findings."""
 
+import shlex
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from statistics import median_high
@@ -48,7 +49,11 @@ class ScenarioReport:
 
     def _found(self) -> Iterator[Diagnostic]:
         for plan, report in self.tried:
-            hint = _listed(report.against) if report.against else None
+            hint = (
+                f"{_listed(report.against)}; to see it: {self._command(plan, report)}"
+                if report.against
+                else None
+            )
             if report.verdict.value == "fails":
                 message = f"`{plan.text}` does not hold: {report.said}"
                 yield Diagnostic("S801", message, plan.span, hint=hint)
@@ -86,12 +91,22 @@ class ScenarioReport:
             if report.verdict.value != "holds":
                 numbers = ", ".join(map(str, report.against))
                 yield f"    at {_place(plan.span)}" + (f"; rooms {numbers}" if numbers else "")
+                if numbers:
+                    yield f"    to see it: {self._command(plan, report)}"
         if self.coverage is not None:
             yield from _coverage(self.coverage, {finding.span for finding in self.findings()})
         if self.depth is not None:
             yield from _depth(self.depth, self.rooms)
         if self.complete:
             yield from self._sufficed()
+
+    def _command(self, plan: PropertyPlan, report: Report) -> str:
+        """What shows the first room that speaks against a claim; with the script, or the rival, if it is about one."""
+        base, mark, parameters = self.scenario.partition("?")
+        name = f"{base}+{plan.rival}{mark}{parameters}" if plan.rival else self.scenario
+        return shlex.join(
+            ["socialai", "trace", name, "--seed", str(self.seed), "--index", str(report.against[0])]
+        )
 
     def _sufficed(self) -> Iterator[str]:
         """What there was time for, where there was not for all."""
