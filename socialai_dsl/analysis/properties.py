@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Final
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.advance import advance, begin, compiled
-from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.effort import Effort, OutOfTimeError
 from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict, Plan
 from socialai_dsl.analysis.knowable import TOGETHER, Knowability, Knowing, RoomKnown, followed
 from socialai_dsl.analysis.muting import muted
@@ -48,6 +49,7 @@ from socialai_dsl.frontend import rival_of
 from socialai_dsl.program import Program, Register
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.terms import Const, InState, SaidBy, walk
+from socialai_dsl.semantics.typed import typed
 from socialai_dsl.source import Span
 
 _HOLDS: Final = "the property holds"
@@ -166,8 +168,24 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         return tally.report(said + ("" if exact else _AS_TRIED), plan.share)
     if reached:
         said += f"; in room {reached[0]} after {steps_text(findings[reached[0]].steps)}"
-        return replace(tally.report(said, 1.0), verdict=Verdict.FAILS, against=tuple(reached[:SHOWN]))
+        acts = _acts(trial.program, effort, reached[0], findings[reached[0]].plan or ())
+        found = tally.report(said, 1.0)
+        return replace(found, verdict=Verdict.FAILS, against=tuple(reached[:SHOWN]), acts=acts)
     return tally.report(said + ("" if exact else _AS_TRIED), 1.0)
+
+
+def _acts(program: Program, effort: Effort, room: int, plan: Plan) -> tuple[str, ...]:
+    """What a plan does in a room, as it is typed; nothing once the time is over."""
+    table = Table([program], 1)
+    found: list[str] = []
+    with suppress(OutOfTimeError):
+        begin(table, effort.seed, {"index": room})
+        for action in plan:
+            table.batch.ports.actions[:] = action
+            advance(table)
+            last = table.describe(0)["last"]
+            found.append(typed(last["action"], last["said"]))
+    return tuple(found) if len(found) == len(plan) else ()
 
 
 def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:

@@ -33,6 +33,7 @@ class Report:
         said: what was found, in words.
         rests: on how many of the rooms it rests; the others say nothing about it.
         pairs: on how many pairs of episodes, where pairs are compared.
+        acts: what is done in the first of `against`, as it is typed, where that is known.
     """
 
     verdict: Verdict
@@ -43,6 +44,7 @@ class Report:
     said: str
     rests: int
     pairs: int = 0
+    acts: tuple[str, ...] = ()
 
 
 @dataclass

@@ -104,9 +104,9 @@ class ScenarioReport:
         """What shows the first room that speaks against a claim; with the script, or the rival, if it is about one."""
         base, mark, parameters = self.scenario.partition("?")
         name = f"{base}+{plan.rival}{mark}{parameters}" if plan.rival else self.scenario
-        return shlex.join(
-            ["socialai", "trace", name, "--seed", str(self.seed), "--index", str(report.against[0])]
-        )
+        acts = [word for act in report.acts for word in ("--do", act)]
+        room = ["--seed", str(self.seed), "--index", str(report.against[0])]
+        return shlex.join(["socialai", "trace", name, *room, *acts])
 
     def _sufficed(self) -> Iterator[str]:
         """What there was time for, where there was not for all."""

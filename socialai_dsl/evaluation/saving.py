@@ -23,10 +23,9 @@ from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name, read_source, shipped_folder
 from socialai_dsl.loader.resolved import TESTS, name_source, parse_name
 from socialai_dsl.program_suite import outcome_name
-from socialai_dsl.semantics.typed import STANDING, split_line
+from socialai_dsl.semantics.typed import typed
 from socialai_dsl.source import Source
 from socialai_dsl.traces.state import found
-from socialai_dsl.vocabulary import PRIMITIVES
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 
@@ -48,7 +47,7 @@ class TakenDialogue(Observer):
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
         last = rooms.env.describe()["last"]
-        typed = _typed(last["action"], last["said"])
+        act = typed(last["action"], last["said"])
         heard = [] if step.info["utterance"] == SILENCE else step.info["utterance"].split("\n")
         states = _states(rooms.env)
         changed = {name: state for name, state in states.items() if self._states.get(name) != state}
@@ -58,10 +57,10 @@ class TakenDialogue(Observer):
             name = outcome_name(step.info)
             self._ends = name.partition("@")[0]
         if not heard and not changed and last["said"] is None:
-            self._waiting.append(typed)
+            self._waiting.append(act)
             return
         self._flush()
-        self._steps.append({"do": typed} | ({"hears": _one_or_all(heard)} if heard else {}))
+        self._steps.append({"do": act} | ({"hears": _one_or_all(heard)} if heard else {}))
         self._steps[-1] |= {"state": changed} if changed else {}
 
     def _flush(self) -> None:
@@ -91,13 +90,6 @@ class TakenDialogue(Observer):
 
 def _one_or_all(texts: list[str]) -> str | list[str]:
     return texts[0] if len(texts) == 1 else texts
-
-
-def _typed(action: str, said: str | None) -> str:
-    """An act as it is typed, so that it is read as itself."""
-    if said is None or action != "none":
-        return action if said is None else f"{action} {said}"
-    return said if split_line(said, PRIMITIVES) == (None, said) else f"{STANDING[1]} {said}"
 
 
 def _states(env: Any) -> dict[str, str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.vocabulary import Sentences
+from socialai_dsl.vocabulary import PRIMITIVES, Sentences
 
 STANDING: Final = (".", "none")
 """What is typed for standing still."""
@@ -23,6 +23,13 @@ def split_line(line: str, actions: Sequence[str]) -> tuple[str | None, str | Non
     if len(meant) == 1 and (first.islower() or first.lower() in actions):
         return meant[0], rest.strip() or None
     return None, line or None
+
+
+def typed(action: str, said: str | None) -> str:
+    """An act as it is typed, so that it is read as itself."""
+    if said is None or action != STANDING[1]:
+        return action if said is None else f"{action} {said}"
+    return said if split_line(said, PRIMITIVES) == (None, said) else f"{STANDING[1]} {said}"
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Trial
 from socialai_dsl.analysis.reports import Report, Verdict
+from socialai_dsl.cli.main import main
 from socialai_dsl.engine.calls import RoomError
 
 # One of two doors is right. Ada tells which to whoever asks and is in front of her.
@@ -310,3 +313,38 @@ def test_a_silenced_member_has_no_face_either(tmp_path: Path) -> None:
     assert isinstance(loaded, socialai_dsl.LoadedScenario)
     (report,) = [found for _, found in check_scenario(loaded, "face", Effort(10)).tried][:1]
     assert (report.verdict, report.held) == (Verdict.HOLDS, 10)
+
+
+DOOR = """scenario: door
+horizon: 20
+actions: [left, right, forward]
+grammar: {templates: [Please open <noun>], nouns: [the door]}
+room: {size: 6}
+objects:
+  gate: {type: door, place: wall(top), state: locked}
+frames:
+  duty:
+    states:
+      watching: {do: face(agent), then: [{hears: Please open the door, when: eye_contact(agent), cause: [gate.open]}]}
+cast:
+  keeper: {name: Ada, frame: duty}
+  agent: {place: anywhere}
+outcome:
+  - success: agent.at(gate)
+check:
+  - {never: gate.open}
+"""
+
+
+def test_a_violation_can_be_pasted_into_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("door.yaml").write_text(DOOR)
+    assert main(["check", "door.yaml", "--rooms", "4"]) == 1
+    (command,) = re.findall(r"to see it: socialai (.*)", capsys.readouterr().out)
+    words = shlex.split(command)
+    assert words[:2] == ["trace", "door.yaml"]
+    assert words[-2:-1] == ["--do"]
+    assert main([*words, "--json"]) == 0
+    assert "gate.open" in capsys.readouterr().out
