@@ -264,7 +264,8 @@ def _apply(library: Library, build: Build, patch: Node) -> None:
     """
     found = DiagnosticBag()
     edits = apply_patch(build.tree, patch, found)
-    if patch.text("of") == ANY:  # of some scenarios it changes nothing
+    # A member of a sweep may be the scenario itself, and a variant of any scenario may change nothing of some.
+    if patch.entry("variant") is None or patch.text("of") == ANY:
         edits = [replace(edit, changes=True) for edit in edits]
     build.edits += edits
     found.raise_errors(library.sources)
