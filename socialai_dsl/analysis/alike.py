@@ -151,13 +151,15 @@ class Lookalikes:
         """
         same = (self._perceived == self._perceived[room]) & (self._relevant != self._relevant[room])
         others = np.flatnonzero(same & self._drawn)
+        if not len(others):
+            return [], []
         table, state = self._table, self._table.state
         state.registers[:], state.boards[:], state.keys[:] = self._registers, self._boards, self._keys
         state.registers[:, Register.ENDED] = 1
         state.registers[[room, *others], Register.ENDED] = 0
         solved: list[int] = []
         failed: list[int] = []
-        for action in plan if len(others) else ():
+        for action in plan:
             table.batch.ports.actions[:] = action
             advance(table)
             registers = state.registers[others]

@@ -58,7 +58,6 @@ _FROM_BEST: Final = (
     Knowability.ALL,
     Knowability.UNDECIDED,
     Knowability.HIDDEN,
-    Knowability.NO_SUCCESS,
 )
 
 

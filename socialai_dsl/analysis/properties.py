@@ -55,9 +55,7 @@ from socialai_dsl.source import Span
 _HOLDS: Final = "the property holds"
 """Name of the outcome that ends an episode of the copy in which a condition is looked for."""
 
-_AS_TRIED: Final = (
-    " (chance during the episode, if only which way somebody turns round, was tried only in part)"
-)
+_AS_TRIED: Final = " (chance during the episode, such as which way somebody turns, was tried only in part)"
 RIVAL_ROOMS: Final = 500
 """In how many rooms a rival plays, at least."""
 _OF_ITSELF: Final = "a success comes of itself, without the agent"

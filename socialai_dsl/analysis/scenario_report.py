@@ -1,6 +1,5 @@
 """What was found out about a scenario by trying it, as lines for people, objects for tools, and findings."""
 
-import shlex
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from statistics import median_high
@@ -14,6 +13,7 @@ from socialai_dsl.analysis.reports import Report, rooms_text
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.frontend import not_ignored
 from socialai_dsl.semantics.plans import PropertyPlan
+from socialai_dsl.semantics.typed import trace_command
 from socialai_dsl.source import Source, Span
 
 
@@ -104,9 +104,8 @@ class ScenarioReport:
         """What shows the first room that speaks against a claim; with the script, or the rival, if it is about one."""
         base, mark, parameters = self.scenario.partition("?")
         name = f"{base}+{plan.rival}{mark}{parameters}" if plan.rival else self.scenario
-        acts = [word for act in report.acts for word in ("--do", act)]
         room = ["--seed", str(self.seed), "--index", str(report.against[0])]
-        return shlex.join(["socialai", "trace", name, *room, *acts])
+        return trace_command(name, room, report.acts)
 
     def _sufficed(self) -> Iterator[str]:
         """What there was time for, where there was not for all."""

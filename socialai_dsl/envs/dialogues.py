@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from socialai_dsl.loader.reader import display_name, read_source
 from socialai_dsl.semantics.dialogues import OPEN
 from socialai_dsl.semantics.plans import ClaimPlan, DialoguePlan, DialogueStepPlan, LinePlan, RulePlan
 from socialai_dsl.semantics.terms import Const
+from socialai_dsl.semantics.typed import trace_command
 from socialai_dsl.source import Node, Span
 from socialai_dsl.vocabulary import TRUTHS
 
@@ -304,7 +304,7 @@ class _Performance:
 
     def _command(self) -> str:
         """What shows the same in a terminal."""
-        room, words = self._plan.room, ["socialai", "trace", self._tested.called]
+        room, words = self._plan.room, list[str]()
         if room.test_episode is not None:
             words += ["--test-episode", str(room.test_episode)]
         else:
@@ -315,7 +315,7 @@ class _Performance:
             words += ["--layout", display_name(self._file(room.layout))]
         elif room.layout is not None:
             words += ["--layout", json.dumps(room.layout, ensure_ascii=False)]
-        return shlex.join([*words, *(word for typed in self._done for word in ("--do", typed))])
+        return trace_command(self._tested.called, words, self._done)
 
 
 def _text(line: LinePlan, values: dict[str, str | None]) -> str:

@@ -71,7 +71,7 @@ class TestsFile(Model):
     tests_of: str = Field(
         min_length=1,
         description="the scenario's file, with variants and parameters",
-        examples=["talkitout.yaml"],
+        examples=["gatekeeper.yaml"],
     )
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")

@@ -562,7 +562,7 @@ class _Run:
         if len({places.key_span(path).file for path in (*parts, *paths, *idle)}) > 1:
             return
         for path in idle:
-            hint = f"delete it, or let somebody follow it: `frame: {path[-1]}`"
+            hint = f"delete it, or give it to a member of the cast: `frame: {path[-1]}`"
             self._findings.warning(
                 "W317", f"nobody follows the frame `{path[-1]}`", places.key_span(path), hint=hint
             )

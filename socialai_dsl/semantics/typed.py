@@ -1,6 +1,7 @@
 """Reads a player's line: a movement, an utterance or both, completed and corrected."""
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -30,6 +31,12 @@ def typed(action: str, said: str | None) -> str:
     if said is None or action != STANDING[1]:
         return action if said is None else f"{action} {said}"
     return said if split_line(said, PRIMITIVES) == (None, said) else f"{STANDING[1]} {said}"
+
+
+def trace_command(scenario: str, room: Sequence[str], acts: Iterable[str]) -> str:
+    """The command that shows a room, given by options, and what is done there, as it is pasted into a terminal."""
+    typed_acts = [word for act in acts for word in ("--do", act)]
+    return shlex.join(["socialai", "trace", scenario, *room, *typed_acts])
 
 
 @dataclass(frozen=True)

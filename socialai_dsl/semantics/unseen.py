@@ -1,4 +1,4 @@
-"""Gestures and looks that are outside of the picture's channels, where somebody relies on them or nobody does."""
+"""Gestures and looks that `observe.channels` leaves out of the picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Reads = Callable[[Term], bool]
 
 
 def check_unseen(checked: CheckedScenario, tone: str | None, findings: Findings) -> None:
-    """Report W321: the agent's own frame goes by what the agent cannot see; or it is shown to nobody.
+    """Report W321 where the agent's own frame asks for something that the picture leaves out, or nobody asks for it.
 
     Args:
         checked: the scenario.
@@ -29,26 +29,26 @@ def check_unseen(checked: CheckedScenario, tone: str | None, findings: Findings)
     if checked.npcs_hidden:
         return
     own = tuple(frame for frame in checked.frames if frame.entity == 0)
+    for asks, what, shown_at, hint in _left_out(checked, tone, findings):
+        relied_on = _relied_on(own, asks, what, hint, findings)
+        if shown_at is not None and not relied_on and not _asked_elsewhere(checked, asks):
+            message = f"nobody sees {what}: `channels` leaves it out, and nothing asks for it"
+            findings.warning("W321", message, shown_at, hint=hint)
+
+
+def _left_out(
+    checked: CheckedScenario, tone: str | None, findings: Findings
+) -> Iterator[tuple[Reads, str, Span | None, str]]:
+    """What asks for each thing that is left out, the thing in words, where it is shown first if it is, and the cure."""
+    pointing = next(_pointing(checked), None)
     if checked.channels <= _GESTURES:
+        member, span = pointing or ("somebody", None)
         hint = "let the picture show it: `observe: {channels: [type, color, status, orientation, pointing, last_act]}`"
-        made = next(_pointing(checked), None)
-        if (
-            not _relied_on(own, _asks_who_points, "where somebody points", hint, findings)
-            and made is not None
-        ):
-            member, span = made
-            if not _asked_elsewhere(checked, _asks_who_points):
-                message = f"nobody sees where `{member}` points: `channels` has no `pointing`, and nothing asks for it"
-                findings.warning("W321", message, span, hint=hint)
+        yield _asks_who_points, f"where {member} points", span, hint
     for look in checked.looks:
-        if look.shown or look.name == tone:
-            continue
-        asks, hint = _asks_for(look), f"add `{look.name}` to `channels`"
-        if not _relied_on(own, asks, f"the look `{look.name}`", hint, findings) and not _asked_elsewhere(
-            checked, asks
-        ):
-            message = f"nobody sees the look `{look.name}`: `channels` leaves it out, and nothing asks for it"
-            findings.warning("W321", message, findings.places.key_span(("looks", look.name)), hint=hint)
+        if not look.shown and look.name != tone:
+            span = findings.places.key_span(("looks", look.name))
+            yield _asks_for(look), f"the look `{look.name}`", span, f"add `{look.name}` to `channels`"
 
 
 def _relied_on(frames: tuple[FramePlan, ...], asks: Reads, what: str, hint: str, findings: Findings) -> bool:
@@ -74,7 +74,7 @@ def _asked_elsewhere(checked: CheckedScenario, asks: Reads) -> bool:
 def _pointing(checked: CheckedScenario) -> Iterator[tuple[str, Span]]:
     """Members that point, and where that is written."""
     for frame in checked.frames:
-        yield from ((frame.member, one.span) for one in frame.activities if one.name == "point")
+        yield from ((f"`{frame.member}`", one.span) for one in frame.activities if one.name == "point")
 
 
 def _asks_who_points(term: Term) -> bool:
