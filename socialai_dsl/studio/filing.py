@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from socialai_dsl.authoring.templates import TEMPLATES, template_files
+from socialai_dsl.errors import UsageError
+from socialai_dsl.loader.pages import page_of
 from socialai_dsl.loader.shipped import file_of, shipped_scenarios, variants_of
 from socialai_dsl.studio import messages
 from socialai_dsl.studio.drafts import Draft
@@ -99,6 +101,12 @@ class Filing:
     def _add(self, asked: messages.Add) -> dict[str, Any]:
         return {"name": self._create_file(asked.name, asked.text)}
 
+    def _explain(self, asked: messages.Explain) -> dict[str, Any]:
+        try:
+            return {"page": page_of(asked.code)}
+        except UsageError as error:
+            raise FileError(str(error)) from None
+
     def _create_file(self, name: str, text: str) -> str:
         return self._folder.create(name, text, self._window)
 
@@ -117,4 +125,5 @@ _ANSWERS: Final[Mapping[type, Callable[[Filing, Any], dict[str, Any]]]] = {
     messages.Copy: Filing._copy,
     messages.Create: Filing._create,
     messages.Add: Filing._add,
+    messages.Explain: Filing._explain,
 }

@@ -208,7 +208,16 @@ class Add(_Message):
     text: str
 
 
-FileQuestion = Hello | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add
+class Explain(_Message):
+    """Show the page about a code of findings."""
+
+    do: Literal["explain"]
+    code: _Word
+
+
+FileQuestion = (
+    Hello | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add | Explain
+)
 WINDOW_QUESTIONS: Final[TypeAdapter[Any]] = TypeAdapter(
     Annotated[_GameQuestion | FileQuestion, Field(discriminator="do")]
 )
@@ -235,13 +244,21 @@ class Refused(_Message):
 
 
 class Finding(BaseModel):
-    """A finding in the text, at a line and column from 1."""
+    """A finding at a line and column from 1.
+
+    Attributes:
+        file: None where it is in the text itself.
+        help: what to do about it. notes: lines that say more.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
+    file: str | None
     line: int
     column: int
     message: str
+    help: str | None
+    notes: list[str]
     code: str
     error: bool
 

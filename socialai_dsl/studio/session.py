@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import NO_BRIEFING, brief
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
-from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
+from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity, printable
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.episodes.play import AGENT
@@ -68,7 +68,9 @@ class Session:
         try:
             self._use(load(path, self._texts))
         except ScenarioError as error:  # it is sound, and nothing that can be played
-            return {"findings": [*told, *(_finding(one, "") for one in error.diagnostics)]}
+            return {
+                "findings": [*told, *(_finding(one, display_name(self._path)) for one in error.diagnostics)]
+            }
         try:
             return {"findings": told, **self.begin(seed)}
         except RefusalError as refusal:
@@ -315,12 +317,13 @@ def _policy(run: str, env: Any) -> Policy:
 
 
 def _finding(found: Diagnostic, own: str) -> Reply:
-    message = found.text if found.hint is None else f"{found.text} ({found.hint})"
-    place = "" if found.span.file == own else f"{found.span}: "
     return {
-        "line": found.span.line if not place else 1,
-        "column": found.span.column if not place else 1,
-        "message": place + message,
+        "file": None if found.span.file == own else found.span.file,
+        "line": found.span.line,
+        "column": found.span.column,
+        "message": found.text,
+        "help": None if found.hint is None else printable(found.hint),
+        "notes": [printable(note) for note in found.notes],
         "code": found.code,
         "error": found.severity is Severity.ERROR,
     }

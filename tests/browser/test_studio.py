@@ -176,7 +176,7 @@ def test_a_mistake_is_underlined_and_the_last_good_room_stays(studio: Page, fold
     studio.keyboard.type("z")
     studio.locator(".stage.stale").wait_for()
     studio.locator(".cm-lintRange-error").first.wait_for()
-    assert "unknown key `zhorizon`" in studio.locator(".findings").inner_text()
+    assert "unknown key zhorizon" in studio.locator(".findings").inner_text()
     assert room(studio) == shown
     studio.keyboard.press("Backspace")
     drawn(studio)
@@ -188,6 +188,92 @@ def test_a_mistake_is_underlined_and_the_last_good_room_stays(studio: Page, fold
     studio.keyboard.press("Control+s")
     studio.get_by_text("saved", exact=True).wait_for()
     assert "horizon: 100 # typed" in (folder / "talkitout.yaml").read_text()
+
+
+def test_a_finding_has_its_cure_and_its_page_and_leads_to_its_place(studio: Page) -> None:
+    studio.locator(".cm-content").get_by_text("horizon", exact=True).click()
+    studio.keyboard.press("End")
+    studio.keyboard.type("x")
+    finding = studio.locator(".findings li.error")
+    finding.first.wait_for()
+    assert studio.get_by_role("tab", name="Findings 1").get_attribute("aria-selected") == "true"
+    place, code = finding.get_by_role("button").all()
+    studio.locator(".cm-content").press("Control+Home")
+    place.click()
+    studio.keyboard.type("y")
+    studio.locator(".cm-content", has_text="horizon: y100x").wait_for()
+    title = f"{code.inner_text()}: "
+    code.click()
+    studio.locator("dialog h2", has_text=title).wait_for()
+    studio.get_by_role("button", name="Close").click()
+    assert not studio.locator("dialog").is_visible()
+
+
+def width(page: Page) -> float:
+    box = page.locator(".writing").bounding_box()
+    assert box is not None
+    return box["width"]
+
+
+def test_the_text_is_made_wider_by_mouse_and_keyboard_and_stays_so(studio: Page) -> None:
+    usual, handle = width(studio), studio.get_by_role("separator", name="width of the text")
+    assert usual > 0.4 * 1280
+    handle.focus()
+    studio.keyboard.press("ArrowRight")
+    until(studio, lambda: 0.015 * 1280 < width(studio) - usual < 0.025 * 1280)
+    assert room(studio), "it is no move of the game"
+    assert step(studio) == 0
+    box = handle.bounding_box()
+    assert box is not None
+    studio.mouse.move(box["x"] + 3, 300)
+    studio.mouse.down()
+    studio.mouse.move(500, 300)
+    studio.mouse.up()
+    until(studio, lambda: abs(width(studio) - 490) < 10)
+    wide = studio.get_by_role("checkbox", name="wrap lines")
+    scroller = "document.querySelector('.cm-scroller').scrollWidth > document.querySelector('.cm-scroller').clientWidth"
+    assert not studio.evaluate(scroller)
+    wide.uncheck()
+    until(studio, lambda: bool(studio.evaluate(scroller)))
+    studio.reload()
+    drawn(studio)
+    assert abs(width(studio) - 490) < 10
+    assert not wide.is_checked()
+    assert studio.evaluate(scroller)
+    studio.get_by_role("separator").focus()
+    studio.keyboard.press("Enter")
+    until(studio, lambda: abs(width(studio) - usual) < 3)
+    studio.keyboard.press("End")  # the room keeps its place
+    assert (studio.locator("main").bounding_box() or {"width": 0})["width"] >= 299
+
+
+def test_a_file_is_shown_from_its_beginning(studio: Page) -> None:
+    studio.get_by_role("checkbox", name="wrap lines").uncheck()
+    studio.evaluate("document.querySelector('.cm-scroller').scrollTo(300, 400)")
+    files = studio.get_by_label("scenario", exact=True).and_(studio.locator("select"))
+    for name in ("talkitout_oracle.yaml", "talkitout.yaml"):
+        with another_room(studio):
+            files.select_option(name)
+        scrolled = (
+            "(({scrollLeft, scrollTop}) => [scrollLeft, scrollTop])(document.querySelector('.cm-scroller'))"
+        )
+        assert studio.evaluate(scrolled) == [0, 0]
+        studio.evaluate("document.querySelector('.cm-scroller').scrollTo(300, 400)")
+
+
+def test_nothing_hides_a_message(studio: Page) -> None:
+    for size in ((1280, 800), (1440, 900), (1000, 700), (500, 800)):
+        studio.set_viewport_size({"width": size[0], "height": size[1]})
+        studio.evaluate("document.querySelector('.message').textContent = 'a long message '.repeat(20)")
+        studio.locator(".message").scroll_into_view_if_needed()
+        covered = studio.evaluate(
+            """() => {
+              const box = document.querySelector('.message').getBoundingClientRect();
+              return [0.1, 0.5, 0.9].filter((part) =>
+                !document.elementFromPoint(box.left + 20, box.top + part * box.height)?.closest('.message'));
+            }"""
+        )
+        assert covered == [], size
 
 
 def test_what_was_not_saved_is_there_after_a_reload(studio: Page, folder: Path) -> None:

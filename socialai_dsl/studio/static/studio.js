@@ -1,171 +1,20 @@
 // @ts-check
 /** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
-import { make, panel } from "./dom.js";
+import { make } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
-import { drawPicture } from "./room.js";
-import { NPC } from "./tiles.js";
+import { findingItems, page } from "./found.js";
+import { Line, address, settings } from "./line.js";
+import { Counts, Seat } from "./parts.js";
 import { Episode, slotsOf } from "./trace.js";
+import { Writing } from "./writing.js";
 
-/** @typedef {Record<string, any>} Reply */
+/** @typedef {import("./line.js").Reply} Reply */
 
-const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450, TRY_EVERY = 1000;
-const LARGEST_MESSAGE = 2 << 20;
-const MARBLE = 16;
-const LOST = "the connection to the studio was lost; what you type stays in this window, which goes on when `socialai studio` runs again at this address";
+const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
 /** @type {Record<string, string>} */
 const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
   t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
-const token = new URLSearchParams(location.search).get("token") ?? "";
-const address = (/** @type {string} */ name) => `ws://${location.host}/${name}?token=${encodeURIComponent(token)}`;
-
-/** The name of this window, which outlives it being loaded again; a browser that keeps nothing gives it another one. */
-const own = {
-  /** @returns {string | null} */
-  get() {
-    try {
-      const name = sessionStorage.getItem("window");
-      return name && /^[0-9a-f]{16}$/.test(name) ? name : null;
-    } catch {
-      return null;
-    }
-  },
-  /** @param {string} name */
-  set(name) {
-    try {
-      sessionStorage.setItem("window", name);
-    } catch {}
-  },
-};
-
-/** Questions to the server; those about files and those about the game are answered in order. */
-class Line {
-  /** @param {(open: boolean, why: string) => void} changed told when the connection opens or is lost, and why
-   * @param {(said: string) => void} told what the server says without being asked */
-  constructor(changed, told) {
-    this.changed = changed;
-    this.told = told;
-    this.number = 0;
-    /** @type {Map<number, (reply: Reply) => void>} */ this.waiting = new Map();
-    this.connect();
-  }
-
-  connect() {
-    this.socket = new WebSocket(address("session"));
-    this.socket.onopen = () => this.greet();
-    this.socket.onmessage = (event) => {
-      const reply = JSON.parse(event.data), answer = this.waiting.get(reply.id);
-      this.waiting.delete(reply.id);
-      if (answer) answer(reply);
-      else if (reply.refused) this.told(reply.refused);
-    };
-    this.socket.onclose = (event) => {
-      for (const answer of this.waiting.values()) answer({ refused: "the connection was lost", lost: true });
-      this.waiting.clear();
-      this.changed(false, event.reason || LOST);
-      setTimeout(() => this.connect(), TRY_EVERY);
-    };
-  }
-
-  /** Say which window this is, by a name that stays when it is loaded again, so that it finds its drafts. */
-  async greet() {
-    const known = await this.ask("hello", { window: own.get() });
-    if (known.refused) return;
-    own.set(known.window);
-    this.changed(true, "");
-  }
-
-  /** @param {string} name @param {Reply} more @returns {Promise<Reply>} */
-  ask(name, more = {}) {
-    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.resolve({ refused: "there is no connection", lost: true });
-    const id = ++this.number, message = JSON.stringify({ id, do: name, ...more });
-    if (message.length > LARGEST_MESSAGE) return Promise.resolve({ refused: "the text is too large for the studio" });
-    this.socket.send(message);
-    return new Promise((resolve) => this.waiting.set(id, resolve));
-  }
-}
-
-/** All rules with how often they have fired, in this episode and in all since the text was changed. */
-class Counts {
-  /** @param {(at: string) => void} open */
-  constructor(open) {
-    this.open = open;
-    this.rows = make("ul", { class: "rules" });
-    this.root = panel("All rules, and how often each fired", "counts", this.rows);
-    /** @type {string[]} of all rules; of a suite behind their member's name and ": " */ this.names = [];
-    this.episodes = 0;
-    /** @type {Map<string, number>} */ this.before = new Map();
-    /** @type {Map<string, import("./trace.js").Rule>} */ this.met = new Map();
-  }
-
-  /** Begin to count anew. */
-  forget() {
-    this.episodes = 0;
-    this.before.clear();
-    this.met.clear();
-  }
-
-  /** Count an episode that another one follows. @param {Episode} episode */
-  keep(episode) {
-    if (!episode.length) return;
-    this.episodes++;
-    const counts = episode.counts(episode.length);
-    episode.rules.forEach((rule, k) => {
-      const key = JSON.stringify(rule);
-      this.met.set(key, rule);
-      this.before.set(key, (this.before.get(key) ?? 0) + (counts.get(k) ?? 0));
-    });
-  }
-
-  /** @param {Episode} episode @param {number} step */
-  show(episode, step) {
-    const counts = episode.counts(step), now = new Map(episode.rules.map((rule, k) => [JSON.stringify(rule), counts.get(k) ?? 0]));
-    const rules = new Map([...this.met, ...episode.rules.map((rule) => /** @type {const} */ ([JSON.stringify(rule), rule]))]);
-    const { member } = episode.scenes[step], prefix = member ? `${member}: ` : "", known = new Set([...rules.values()].map((rule) => rule.name));
-    const others = this.names.filter((name) => name.startsWith(prefix)).map((name) => name.slice(prefix.length)).filter((name) => !known.has(name));
-    const met = [...rules].map(([key, rule]) => {
-      const here = now.get(key) ?? 0, all = here + (this.before.get(key) ?? 0);
-      return make("li", { class: all ? "fired" : "not" },
-        make("b", {}, `${here}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
-        make("small", {}, make("button", { class: "link", onclick: () => this.open(rule.at) }, rule.at),
-          this.episodes ? ` · ${all}× in ${this.episodes + 1} episodes` : ""),
-        make("code", {}, rule.words));
-    });
-    this.rows.replaceChildren(...met, ...others.map((name) => make("li", { class: "not" }, make("b", {}, "0× "), name, make("small", {}, " · not asked yet"))));
-  }
-}
-
-/** The view with directions as the observation has them: where they are those of a compass, the agent's own is not given.
- * @param {import("./trace.js").Picture} view @param {number} facing where the agent looks @param {boolean} compass
- * @returns {import("./trace.js").Picture} */
-function observed(view, facing, compass) {
-  const turned = (/** @type {number} */ drawn) => (drawn + facing + 1) % 4;
-  const turns = (/** @type {number} */ type) => type === MARBLE || (type === NPC && compass);
-  const cells = view.cells.map(([type, colour, status, drawn]) =>
-    /** @type {import("./trace.js").Look} */ ([type, colour, status, turns(type) ? turned(drawn) : drawn]));
-  const gestures = new Map([...view.gestures].map(([cell, one]) =>
-    [cell, compass && one.pointing >= 0 ? { ...one, pointing: turned(one.pointing) } : one]));
-  return { ...view, cells, gestures };
-}
-
-/** What a person on the agent's seat gets, and nothing else. */
-class Seat {
-  constructor() {
-    this.told = make("p");
-    this.canvas = make("canvas", { role: "img", "aria-label": "what the agent sees, 7 by 7 cells; the agent looks up" });
-    this.seen = make("pre", { "aria-live": "polite" });
-    this.root = panel("As the agent sees it", "seat", this.told, this.canvas, this.seen);
-    /** @type {{told: string, seen: string, compass: boolean}[]} of each moment */ this.moments = [];
-  }
-
-  /** @param {Episode} episode @param {number} step */
-  show(episode, step) {
-    const { told, seen, compass } = this.moments[step], { view, moment } = episode.scenes[step];
-    drawPicture(this.canvas, observed(view, moment.agent[2], compass), { tile: 64 });
-    this.told.textContent = told;
-    this.seen.textContent = seen;
-  }
-}
 
 class Studio {
   constructor() {
@@ -184,6 +33,11 @@ class Studio {
     this.again = false;
 
     const goTo = (/** @type {string} */ at) => this.editorAt(at);
+    /** @type {import("./found.js").Ways} */
+    this.ways = {
+      goTo: ({ file, line, column }) => (file ? this.editorAt(`${file}:${line}`, column) : this.editor.goTo(line, column)),
+      explain: (code) => this.explain(code),
+    };
     this.stage = new Stage();
     this.counts = new Counts(goTo);
     this.seat = new Seat();
@@ -194,6 +48,7 @@ class Studio {
     /** @type {Reply[]} drafts that no window shows */ this.others = [];
     this.kept = make("button", { onclick: () => this.offerDrafts(), hidden: true });
     this.findings = make("ul", { class: "findings", "aria-label": "findings" });
+    this.sound = make("p", { class: "quiet" }, "Nothing is wrong.");
     this.message = make("p", { class: "message", role: "status" });
     this.title = make("h1", {}, "studio");
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.begin(Number(this.seedField.value)) });
@@ -210,13 +65,15 @@ class Studio {
     this.words = make("span", { class: "words" });
     this.sentences = make("datalist", { id: "sentences" });
     this.typed = make("input", { list: "sentences", placeholder: "or type: forward, How are you …", "aria-label": "what to do or say" });
-    this.checked = make("div", { class: "checked" }, make("p", { class: "quiet" }, "`check` tries in a hundred rooms what the scenario claims; it takes up to 20 seconds."));
+    this.checked = make("div", { class: "checked" }, make("p", { class: "quiet" }, "Nothing was checked yet."));
     this.dialog = make("dialog");
-    this.pane = make("div", { class: "text" });
+    const checking = make("button", { onclick: () => this.check(), title: "try in a hundred rooms what the scenario claims; it takes up to 20 seconds" }, "Check the claims");
+    this.writing = new Writing({ Findings: make("div", {}, this.findings, this.sound), Claims: this.checked }, checking);
+    this.wraps = make("input", { type: "checkbox", checked: settings.get("wraps", "yes") === "yes", onchange: () => this.wrap() });
     this.root = this.layout(parts);
     document.body.replaceChildren(this.root);
     const nonce = document.querySelector("meta[name=style-nonce]")?.getAttribute("content") ?? "";
-    this.editor = new Editor(this.pane, { root, language: address("language"), nonce, changed: () => this.typedText(), save: () => this.save() });
+    this.editor = new Editor(this.writing.pane, { root, language: address("language"), nonce, wraps: this.wraps.checked, changed: () => this.typedText(), save: () => this.save() });
     this.line = new Line((open, why) => this.connected(open, why), (said) => this.tell(said));
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("resize", () => this.show());
@@ -230,6 +87,7 @@ class Studio {
     const button = (/** @type {string} */ text, /** @type {() => void} */ act, title = text) => make("button", { onclick: act, title }, text);
     const bar = make("header", {}, this.title, this.files, button("New…", () => this.offer(), "a template, or a copy of a shipped scenario"),
       button("Save", () => this.save(), "Ctrl-S"), this.state, this.kept,
+      make("label", {}, this.wraps, " wrap lines"),
       make("span", { class: "filler" }),
       button("Replay", () => this.export("replay"), "save this episode as a page of its own"),
       button("◐", () => this.shade(), "light or dark"));
@@ -245,12 +103,12 @@ class Studio {
     const arrange = make("div", { class: "controls arrange" }, make("label", {}, "thing ", this.thing),
       button("Move it", () => this.moving(this.placeOf(this.thing.value)), "then by the arrow keys; Enter puts it down, Esc leaves it (M)"),
       button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"));
-    const check = panel("Check", "check", button("Check the claims", () => this.check()), this.checked);
     const help = make("details", { class: "panel" }, make("summary", {}, "Keys and colours"),
       make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
     return make("div", { class: "studio" }, bar,
-      make("section", { class: "writing", "aria-label": "scenario" }, this.pane, this.findings),
-      make("main", {}, this.stage.root, this.seat.root, this.message, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root), check),
+      this.writing.root, this.writing.handle,
+      make("main", {}, this.stage.root, this.message,
+        make("div", { class: "below" }, this.seat.root, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root))),
       make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
   }
 
@@ -407,7 +265,7 @@ class Studio {
       this.dialog.close();
       act();
     };
-    this.dialog.replaceChildren(make("p", {}, text), ...more, make("div", { class: "controls" }, ...answers.map(([word, act]) => make("button", { onclick: close(act) }, word))));
+    this.dialog.replaceChildren(text ? make("p", {}, text) : "", ...more, make("div", { class: "controls" }, ...answers.map(([word, act]) => make("button", { onclick: close(act) }, word))));
     if (!this.dialog.open) this.dialog.showModal();
   }
 
@@ -429,13 +287,25 @@ class Studio {
     ], make("label", {}, "Template ", template), make("label", {}, "Name ", called), make("label", {}, "Shipped ", copy));
   }
 
-  /** @param {string} at file:line */
-  async editorAt(at) {
+  /** Show the page about a code of findings. @param {string} code */
+  async explain(code) {
+    const found = await this.line.ask("explain", { code });
+    if (found.refused) return this.tell(found.refused);
+    this.ask("", [["Close", () => {}]], page(found.page));
+  }
+
+  wrap() {
+    settings.set("wraps", this.wraps.checked ? "yes" : "no");
+    this.editor.wrap(this.wraps.checked);
+  }
+
+  /** @param {string} at file:line @param {number} [column] */
+  async editorAt(at, column = 1) {
     const [, file, line] = /^(.*):(\d+)$/.exec(at) ?? ["", "", "1"];
     const name = /** @type {string[]} */ (this.offered?.files ?? []).find((one) => one === file || file.endsWith(`/${one}`));
     if (!name) return this.tell(`${at} is not a file of this folder`);
     if (name !== this.name) await this.openFile(name);
-    this.editor.goTo(Number(line));
+    this.editor.goTo(Number(line), column);
   }
 
   // -- the game --------------------------------------------------------------------------------------------------
@@ -456,8 +326,10 @@ class Studio {
       return;
     }
     const findings = drawn.findings ?? [];
-    this.findings.replaceChildren(...findings.map((/** @type {Reply} */ one) => make("li", { class: one.error ? "error" : "warning" },
-      make("button", { class: "link", onclick: () => this.editor.goTo(one.line) }, `${one.line}:${one.column}`), ` ${one.code} `, one.message)));
+    this.findings.replaceChildren(...findingItems(findings, this.ways));
+    this.sound.hidden = findings.length > 0;
+    this.writing.count("Findings", findings.length ? String(findings.length) : "", findings.some((/** @type {Reply} */ one) => one.error) ? "bad" : "open");
+    if (findings.some((/** @type {Reply} */ one) => one.error)) this.writing.choose("Findings");
     this.stage.root.classList.toggle("stale", !drawn.trace);
     if (drawn.trace) {
       this.counts.forget();
@@ -705,7 +577,7 @@ class Studio {
       return;
     }
     if (event.ctrlKey || event.metaKey || event.altKey || this.dialog.open || !(target instanceof HTMLElement)) return;
-    if (target.closest("input, select, textarea, .text") || (target instanceof HTMLButtonElement && [" ", "Enter"].includes(key))) {
+    if (target.closest("input, select, textarea, .text, [role=tablist]") || (target instanceof HTMLButtonElement && [" ", "Enter"].includes(key))) {
       if (key === "Escape") target.blur();
       return;
     }

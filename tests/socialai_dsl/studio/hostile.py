@@ -32,6 +32,7 @@ FILES: list[dict[str, Any]] = [
     {"do": "copy", "shipped": "dance"},
     {"do": "create", "template": "empty", "called": "mine"},
     {"do": "add", "name": "added.yaml", "text": "x"},
+    {"do": "explain", "code": "S101"},
 ]
 
 _scalars = (
