@@ -47,6 +47,20 @@ class ScenarioReport:
         """
         return not_ignored(self._found(), self.sources)
 
+    def parts(self) -> Iterator[Diagnostic]:
+        """The warnings of `findings` about parts that never happen."""
+        return not_ignored(self._parts(), self.sources)
+
+    def summary(self) -> Iterator[str]:
+        """The lines of the report without its claims and findings."""
+        yield f"{self.scenario}: {self.rooms} rooms of seed {self.seed}"
+        if self.coverage is not None:
+            yield from _coverage(self.coverage, ())
+        if self.depth is not None:
+            yield from _depth(self.depth, self.rooms)
+        if self.complete:
+            yield from self._sufficed()
+
     def _found(self) -> Iterator[Diagnostic]:
         for plan, report in self.tried:
             hint = (
@@ -60,14 +74,18 @@ class ScenarioReport:
             elif report.verdict.value == "undecided":
                 message = f"`{plan.text}` is undecided: {report.said}"
                 yield Diagnostic("W802", message, plan.span, Severity.WARNING, hint)
-        if self.coverage is not None:
-            never = _never(self.coverage, rooms_text(self.rooms))
-            for part in self.coverage.missing:
-                message = f"the {part.kind} `{part.name}` {never}"
-                yield Diagnostic("W802", message, part.span, Severity.WARNING)
+        yield from self._parts()
         if self._is_hopeless and self.outcomes is not None:
             message = f"no success can be reached in any of {self.depth.rooms if self.depth else 0} rooms"
             yield Diagnostic("S801", message, self.outcomes)
+
+    def _parts(self) -> Iterator[Diagnostic]:
+        if self.coverage is None:
+            return
+        never = _never(self.coverage, rooms_text(self.rooms))
+        for part in self.coverage.missing:
+            message = f"the {part.kind} `{part.name}` {never}"
+            yield Diagnostic("W802", message, part.span, Severity.WARNING)
 
     @property
     def _is_hopeless(self) -> bool:

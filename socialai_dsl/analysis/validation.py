@@ -93,7 +93,7 @@ def _rehearsed(result: CheckResult, judged: bool) -> Iterator[Diagnostic]:
     for one in result.tested:
         rehearsal = Rehearsal(one)
         for plan in one.loaded.checked.tests:
-            yield from rehearsal.play(plan, judged)
+            yield from rehearsal.play(plan, judged).findings
 
 
 def _tried(result: CheckResult, effort: Callable[[], Effort], say: Say | None) -> Iterator[Diagnostic]:

@@ -20,6 +20,10 @@ _ALONE: Final = re.compile(r"[A-Za-z](?:[^:#]|[:#](?=\w))*(?<! )")
 """What needs none as the value of a key in a line of its own."""
 
 
+class NameTakenError(UsageError):
+    """A file has a test of this name already."""
+
+
 def test_text(name: str, test: Mapping[str, Any]) -> str:
     """An entry of `tests`, indented by two.
 
@@ -41,7 +45,8 @@ def file_with(source: Source | None, tests_of: str, name: str, test: Mapping[str
         force: whether a test of this name may be replaced.
 
     Raises:
-        UsageError: there is a test of this name, or the file is none of tests.
+        NameTakenError: there is a test of this name.
+        UsageError: the file is none of tests.
         ScenarioError: the file is not YAML as the language has it.
     """
     if source is None:
@@ -54,7 +59,7 @@ def file_with(source: Source | None, tests_of: str, name: str, test: Mapping[str
     written = test_text(name, test).splitlines(keepends=True)
     former = tests.entry(name)
     if former is not None and not force:
-        raise UsageError(f"{source.name} has a test `{name}` already; --force replaces it")
+        raise NameTakenError(f"{source.name} has a test `{name}` already")
     begins, ends = _lines(document, tests, name)
     if lines and not lines[-1].endswith("\n"):
         lines[-1] += "\n"

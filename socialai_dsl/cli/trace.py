@@ -121,7 +121,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 def _save(taken: TakenDialogue, arguments: argparse.Namespace, reset: dict[str, Any]) -> None:
     """Save the episode as a test; where it went is no part of the trace."""
     saved = save_test(taken, arguments.scenario, reset, arguments.save_test, arguments.force)
-    if saved.path is None:
-        print(f"\n{saved.text}", end="", file=sys.stderr if arguments.json else sys.stdout)
+    if saved.beside is None:
+        print(f"\n{saved.entry}", end="", file=sys.stderr if arguments.json else sys.stdout)
     else:
-        print(f"wrote the test `{arguments.save_test}` into {display_name(saved.path)}", file=sys.stderr)
+        print(f"wrote the test `{arguments.save_test}` into {display_name(saved.beside)}", file=sys.stderr)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +26,22 @@ from socialai_dsl.semantics.terms import Const
 from socialai_dsl.semantics.typed import trace_command
 from socialai_dsl.source import Node, Span
 from socialai_dsl.vocabulary import TRUTHS
+
+
+@dataclass(frozen=True)
+class Performed:
+    """A test as it was played in one room.
+
+    Attributes:
+        findings: what is wrong there.
+        reset: the arguments of `env.reset`; empty if there is no such room.
+        done: the acts, as typed.
+    """
+
+    findings: tuple[Diagnostic, ...]
+    reset: Mapping[str, Any]
+    done: tuple[str, ...]
+
 
 SEEDS: Final = 5
 """In how many rooms a test is played that does not say in which."""
@@ -53,8 +69,8 @@ class Rehearsal:
         checked = tested.loaded.checked
         self._env = ScenarioEnv(compile_scenario(checked), scenarios=(checked,))
 
-    def play(self, plan: DialoguePlan, judged: bool = True) -> tuple[Diagnostic, ...]:
-        """What is wrong in the first room in which something is.
+    def play(self, plan: DialoguePlan, judged: bool = True) -> Performed:
+        """Play a test in its rooms, up to the first in which something is wrong; as it went in the last one played.
 
         Args:
             plan: one of the tests.
@@ -65,11 +81,14 @@ class Rehearsal:
             loaded = self._tested.loaded
             asking = replace(loaded, checked=replace(loaded.checked, probes=plan.values))
             companion = Companion(asking)
+        performed = Performed((), {}, ())
         for seed in seeds_of(plan):
-            found = tuple(_Performance(self._env, self._tested, plan, seed, companion).findings(judged))
+            performance = _Performance(self._env, self._tested, plan, seed, companion)
+            found = tuple(performance.findings(judged))
+            performed = Performed(found, performance.reset, tuple(performance.done))
             if found:
-                return found
-        return ()
+                break
+        return performed
 
 
 @dataclass(frozen=True)
@@ -87,16 +106,20 @@ class _End:
 
 
 class _Performance:
-    """A test while it is played in one room."""
+    """A test while it is played in one room.
+
+    Attributes:
+        reset, done: see `Performed`.
+    """
 
     def __init__(
         self, env: ScenarioEnv, tested: Tested, plan: DialoguePlan, seed: int, companion: Companion | None
     ) -> None:
         self._env, self._tested, self._plan, self._seed = env, tested, plan, seed
         self._companion = companion
-        self._reset: dict[str, Any] = {}
+        self.reset: dict[str, Any] = {}
         self._actions: list[NDArray[np.int64]] = []
-        self._done: list[str] = []
+        self.done: list[str] = []
         self._earned = 0.0
         self._end: _End | None = None
         self._step = 0
@@ -160,7 +183,7 @@ class _Performance:
 
     def _begin(self) -> None:
         room = self._plan.room
-        self._reset = reset = reset_arguments(self._seed, room.index, room.test_episode, self._layout())
+        self.reset = reset = reset_arguments(self._seed, room.index, room.test_episode, self._layout())
         observation, _ = self._env.reset(**reset)
         if self._companion is not None:
             self._companion.begin(reset.get("seed"), reset["options"], observation["image"])
@@ -176,7 +199,7 @@ class _Performance:
         """Do something; what is heard."""
         action = np.array(act, np.int64)
         observation, reward, terminated, truncated, info = self._env.step(action)
-        self._done.append(typed)
+        self.done.append(typed)
         self._actions.append(action)
         self._earned += reward
         if terminated or truncated:
@@ -188,7 +211,7 @@ class _Performance:
     # -- what must be so -----------------------------------------------------------------------------------------
 
     def _wrong(self, step: DialogueStepPlan, heard: list[str]) -> Iterator[Diagnostic]:
-        values = self._companion.values(begins=not self._done) if self._companion is not None else {}
+        values = self._companion.values(begins=not self.done) if self._companion is not None else {}
         if step.hears is not None:
             expected = [_text(line, values) for line in step.hears]
             if expected != heard:
@@ -217,7 +240,7 @@ class _Performance:
             (member,) = claim.members
             now = self._described(member).get("state")
             said = f"`{member}` is {'elsewhere' if now is None else f'in `{now}`'}, expected `{claim.state}`"
-        elif claim.expected and self._done:
+        elif claim.expected and self.done:
             why = self._false_part(claim)
             part = [f"-> {why}"] if why != f"{claim.words} is false" else []
         rules = [*part, *self._rules("others", claim.members, ""), *self._rules("fired", claim.members, "")]
@@ -233,7 +256,7 @@ class _Performance:
         known = {item.path: item for item in (*claim.value.remembered, *checked.remembered)}
         ruled = replace(checked, rules=(*checked.rules, rule), remembered=tuple(known.values()))
         env = ScenarioEnv(compile_scenario(ruled), scenarios=(ruled,))
-        env.reset(**self._reset)
+        env.reset(**self.reset)
         for action in self._actions:
             env.step(action)
         others = (entry for entry in env.explain()["others"] if entry["name"] == rule.name)
@@ -258,7 +281,7 @@ class _Performance:
         written = self._test.at(("play", self._step - 1, "do"))
         span = written.value_span((number,)) if written.children is not None else written.value_span()
         name = self._end.name if self._end is not None else ""
-        said = f"the episode ended with `{name}` before, after {len(self._done)} acts"
+        said = f"the episode ended with `{name}` before, after {len(self.done)} acts"
         return self._finding("S804", said, span, self._rules("fired", ("outcome",), ""))
 
     # -- why -----------------------------------------------------------------------------------------------------
@@ -296,7 +319,7 @@ class _Performance:
             who: the members of the cast, or `outcome`.
             key: those of their rules that have it, if any has.
         """
-        if not self._done or not who:
+        if not self.done or not who:
             return []
         found = [rule for rule in self._env.explain()[which] if rule["who"] in who]
         found = [rule for rule in found if key in rule["words"]] or ([] if which == "fired" else found)
@@ -315,7 +338,7 @@ class _Performance:
             words += ["--layout", display_name(self._file(room.layout))]
         elif room.layout is not None:
             words += ["--layout", json.dumps(room.layout, ensure_ascii=False)]
-        return trace_command(self._tested.called, words, self._done)
+        return trace_command(self._tested.called, words, self.done)
 
 
 def _text(line: LinePlan, values: dict[str, str | None]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,16 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.atomic import write_text
-from socialai_dsl.authoring.saving import file_with, test_text
+from socialai_dsl.authoring.saving import NameTakenError, file_with, test_text
 from socialai_dsl.checking.loaded import LoadedSuite
-from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.envs.scenario_env import SILENCE
 from socialai_dsl.episodes.play import Observer, Rooms, Step
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.testing import passes
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name, read_source, shipped_folder
-from socialai_dsl.loader.resolved import TESTS, name_source, parse_name
+from socialai_dsl.loader.resolved import TESTS, taken_apart
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.semantics.typed import typed
 from socialai_dsl.source import Source
@@ -104,49 +103,77 @@ def _states(env: Any) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
-class SavedTest:
+class WrittenTest:
     """A test as text.
 
     Attributes:
-        text: the entry. path: the file it was written into; None for a scenario that ships, beside which nothing is
-            written.
+        entry: the test. text: the file beside the scenario with it, in which it passes.
+        beside: that file; None for a scenario that ships, beside which nothing is written.
     """
 
+    entry: str
     text: str
-    path: Path | None
+    beside: Path | None
 
 
-def save_test(
-    taken: TakenDialogue, scenario: str, reset: Mapping[str, Any], name: str, force: bool = False
-) -> SavedTest:
-    """Write an episode as a test into the file beside its scenario.
+def written_test(
+    taken: TakenDialogue,
+    scenario: str,
+    reset: Mapping[str, Any],
+    name: str,
+    read: Callable[[Path], Source | None],
+    force: bool = False,
+    texts: Mapping[Path, Source] | None = None,
+) -> WrittenTest:
+    """An episode as a test in the file beside its scenario; nothing is written to the disk.
 
     Args:
         taken: the episode.
         scenario: as it was asked for, with variants and parameters.
         reset: the arguments of `env.reset`.
         name: of the test.
+        read: the file beside the scenario; None if there is none yet.
         force: whether a test of this name may be replaced.
+        texts: contents that stand for those of files, as `load` takes them.
 
     Raises:
         OptionError: that is no name.
-        UsageError: the name is taken, or it is a suite, or the test would not pass.
-        ScenarioError: the file beside the scenario has mistakes.
-        OSError: it cannot be written.
+        NameTakenError: there is a test of this name.
+        UsageError: it is a suite.
+        ScenarioError: the file beside the scenario has mistakes, or the test would not pass.
     """
     if not _NAME.fullmatch(name):
         raise OptionError("save_test", f"got {name!r}, expected letters, digits and underscores (at most 40)")
-    loaded = load(scenario)
+    loaded = load(scenario, texts)
     if isinstance(loaded, LoadedSuite):
         raise UsageError(f"{scenario} is a suite; tests are of a scenario, so play one of its members")
     path = loaded.resolved.path
     beside = path.with_name(path.stem + TESTS)
-    base = parse_name(scenario, name_source(scenario).span(1, 1), DiagnosticBag(), Path()).base.text
-    test = taken.test(scenario[len(base) :], reset)
+    test = taken.test(taken_apart(scenario)[1], reset)
+    entry = test_text(name, test)
     if path.is_relative_to(shipped_folder().resolve()):
-        return SavedTest(test_text(name, test), None)
-    former = read_source(beside) if beside.exists() else None
-    text = file_with(former, path.name, name, test, force)
-    passes(Source(display_name(beside), text, beside), name)
-    write_text(beside, text)
-    return SavedTest(test_text(name, test), beside)
+        return WrittenTest(entry, entry, None)
+    text = file_with(read(beside), path.name, name, test, force)
+    passes(Source(display_name(beside), text, beside), name, texts)
+    return WrittenTest(entry, text, beside)
+
+
+def save_test(
+    taken: TakenDialogue, scenario: str, reset: Mapping[str, Any], name: str, force: bool = False
+) -> WrittenTest:
+    """Write an episode as a test into the file beside its scenario; see `written_test`.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+
+    def read(beside: Path) -> Source | None:
+        return read_source(beside) if beside.exists() else None
+
+    try:
+        written = written_test(taken, scenario, reset, name, read, force)
+    except NameTakenError as taken_name:
+        raise UsageError(f"{taken_name}; --force replaces it") from None
+    if written.beside is not None:
+        write_text(written.beside, written.text)
+    return written

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,14 +14,14 @@ from socialai_dsl.analysis.check import compile_engine
 from socialai_dsl.checking.formats import CheckedInput
 from socialai_dsl.checking.tests import Tested
 from socialai_dsl.diagnostics import DiagnosticBag, Severity, to_json
-from socialai_dsl.envs.dialogues import Rehearsal, seeds_of
+from socialai_dsl.envs.dialogues import Performed, Rehearsal, seeds_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.loader.given import given_files
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.loader.resolved import TESTS, name_source, parse_name, resolve
+from socialai_dsl.loader.resolved import TESTS, resolve, taken_apart
 from socialai_dsl.semantics.plans import DialoguePlan
 from socialai_dsl.source import Source
 
@@ -35,12 +35,14 @@ class PlayedTest:
     Attributes:
         plan: the test. called: the scenario that was played.
         outcome: its name, what is wrong, and the files that this points into.
+        performed: how it went in the last room in which it was played.
         seconds: what it took.
     """
 
     plan: DialoguePlan
     called: str
     outcome: CheckedInput
+    performed: Performed
     seconds: float
 
     @property
@@ -65,7 +67,10 @@ class PlayedTest:
 
 
 def play_tests(
-    names: Sequence[str], chosen: str | None = None, say: Callable[[PlayedTest], None] = lambda _: None
+    names: Sequence[str],
+    chosen: str | None = None,
+    say: Callable[[PlayedTest], None] = lambda _: None,
+    texts: Mapping[Path, Source] | None = None,
 ) -> list[PlayedTest]:
     """Play the tests of files and scenarios.
 
@@ -74,13 +79,14 @@ def play_tests(
             `+variants` or `?parameters` those that play just these.
         chosen: words, with `and`, `or`, `not` and brackets, that must be part of the names; None: all.
         say: takes each test as soon as it has been played.
+        texts: contents that stand for those of files, as `check` takes them.
 
     Raises:
         ScenarioError: with all mistakes in these files.
         UsageError: there is no test, or none that is chosen, or `chosen` is no such expression.
     """
     wanted = _Choice(chosen)
-    found, sources = _found(names)
+    found, sources = _found(names, texts or {})
     tests = [(one, plan) for one in found for plan in one.loaded.checked.tests if wanted.takes(one, plan)]
     if not tests:
         what = "tests" if chosen is None or not found else f"a test that is called {chosen!r}"
@@ -93,19 +99,20 @@ def play_tests(
         for plan in plans:
             assert rehearsal is not None, "internal: there is something to play"
             begun = perf_counter()
-            outcome = CheckedInput(f"{plan.span.file}::{plan.name}", rehearsal.play(plan), sources)
-            played.append(PlayedTest(plan, one.called, outcome, perf_counter() - begun))
+            performed = rehearsal.play(plan)
+            outcome = CheckedInput(f"{plan.span.file}::{plan.name}", performed.findings, sources)
+            played.append(PlayedTest(plan, one.called, outcome, performed, perf_counter() - begun))
             say(played[-1])
     return played
 
 
-def _found(names: Sequence[str]) -> tuple[list[Tested], dict[str, Source]]:
+def _found(names: Sequence[str], texts: Mapping[Path, Source]) -> tuple[list[Tested], dict[str, Source]]:
     """The tests of files and scenarios, with all files that were read."""
     bag, sources = DiagnosticBag(), dict[str, Source]()
     found: list[Tested] = []
-    given = (file for name in given_files(names) for file in _files(name))
+    given = (file for name in given_files(names) for file in _files(name, texts))
     for file, suffix in dict.fromkeys(given):
-        result = check(file)
+        result = check(file, texts)
         bag.extend(d for d in result.diagnostics if d.severity is Severity.ERROR)
         sources |= result.sources
         if not result.has_errors:
@@ -114,14 +121,17 @@ def _found(names: Sequence[str]) -> tuple[list[Tested], dict[str, Source]]:
     return found, sources
 
 
-def _files(name: str) -> Iterator[tuple[str, str]]:
+def _files(name: str, texts: Mapping[Path, Source]) -> Iterator[tuple[str, str]]:
     """The files that may have tests of a name, and the end of the names of the scenarios that these are to play."""
-    source = name_source(name)
-    base = parse_name(name, source.span(1, 1), DiagnosticBag(), Path()).base.text
-    path = Path(base) if Path(base).is_file() else resolve(base).path
+    base, suffix = taken_apart(name)
+    path = Path(base)
+    if not path.is_file() and path.resolve() not in texts:
+        path = resolve(base).path
     for file in dict.fromkeys((path, path.with_name(path.stem.removesuffix(".tests") + TESTS))):
-        if file.is_file() and _HAS_TESTS.search(file.read_text("utf-8", "replace")):
-            yield display_name(file), name[len(base) :]
+        own = texts.get(file.resolve())
+        text = own.text if own else file.read_text("utf-8", "replace") if file.is_file() else ""
+        if _HAS_TESTS.search(text):
+            yield display_name(file), suffix
 
 
 @dataclass(frozen=True)
@@ -157,18 +167,18 @@ def _holds(tree: ast.Expr, name: str) -> bool:
     raise UsageError(f"-k: expected words with `and`, `or` and `not`, got {ast.unparse(tree)!r}")
 
 
-def passes(source: Source, name: str) -> None:
-    """See that a test passes, in a file that need not be on the disk yet.
+def passes(source: Source, name: str, texts: Mapping[Path, Source] | None = None) -> None:
+    """See that a test passes, in a file that need not be on the disk yet, among `texts` as `check` takes them.
 
     Raises:
         ScenarioError: with what is wrong.
     """
     assert source.path is not None, "internal: tests stand in files"
-    result = check(source.path, {source.path.resolve(): source})
+    result = check(source.path, {**(texts or {}), source.path.resolve(): source})
     result.read()
     bag = DiagnosticBag()
     for one in result.tested:
         for plan in one.loaded.checked.tests:
             if plan.name == name:
-                bag.extend(Rehearsal(one).play(plan))
+                bag.extend(Rehearsal(one).play(plan).findings)
     bag.raise_errors(result.sources)

@@ -109,6 +109,12 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
     return ScenarioName(_part(text, 0, plus, start), variants, params)
 
 
+def taken_apart(name: str) -> tuple[str, str]:
+    """A name from outside any file as its base, and the variants and parameters behind it as they are written."""
+    base = parse_name(name, name_source(name).span(1, 1), DiagnosticBag(), Path()).base.text
+    return base, name[len(base) :]
+
+
 def _is_file(text: str, folder: Path | None) -> bool:
     return folder is not None and is_file(folder / text)
 

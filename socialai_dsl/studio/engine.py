@@ -16,12 +16,12 @@ from typing import Final
 from pydantic import ValidationError
 
 from socialai_dsl.studio.files import PLAYERS
-from socialai_dsl.studio.messages import ANSWERS, Begin, Check, Question
+from socialai_dsl.studio.messages import ANSWERS, Begin, Check, Question, Show, Test, WriteTest
 from socialai_dsl.studio.worker import answer_window
 
 _LONGEST_ANSWER: Final = 32 << 20
 _START_SECONDS: Final = 120.0
-_CHECK_SECONDS: Final = 90.0
+_TRYING_SECONDS: Final = 90.0
 _LOADING_SECONDS: Final = 60.0
 _USUAL_SECONDS: Final = 10.0
 _SAFE_PATH: Final = "PYTHONSAFEPATH"
@@ -168,7 +168,9 @@ class Engine:
 
 def _seconds(question: Question) -> float:
     """How long an answer may take."""
-    if isinstance(question, Check):
-        return _CHECK_SECONDS
+    if isinstance(question, Check | Test):
+        return _TRYING_SECONDS
+    if isinstance(question, Show | WriteTest):
+        return _LOADING_SECONDS
     loads = isinstance(question, Begin) and question.player not in PLAYERS
     return _LOADING_SECONDS if loads else _USUAL_SECONDS

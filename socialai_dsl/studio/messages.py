@@ -24,10 +24,38 @@ _Word = Annotated[str, Field(max_length=2_000)]
 WindowId = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
 
 
-class _Message(BaseModel):
+class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
+
+class _Message(_Part):
     id: _Number
+
+
+class Room(_Part):
+    """A room, as `socialai trace` takes it.
+
+    Attributes:
+        index: which room of the seed. test_episode: in place of both. layout: what is known of it.
+    """
+
+    seed: _Seed = 0
+    index: _Number | None = None
+    test_episode: _Number | None = None
+    layout: dict[str, Any] | None = None
+
+
+class Shown(_Part):
+    """What can be seen in a room.
+
+    Attributes:
+        variant: variants and parameters behind the scenario's name.
+        acts: what is done there, as typed; None: what the script does, if there is one.
+    """
+
+    room: Room
+    variant: _Word = ""
+    acts: list[_Word] | None = None
 
 
 # -- what a window asks its process -----------------------------------------------------------------------------------
@@ -39,15 +67,27 @@ class Draw(_Message):
     do: Literal["draw"]
     path: _Word
     text: str
-    seed: _Seed = 0
+    room: Room = Room()
 
 
 class Begin(_Message):
-    """Begin an episode; `player` is `me`, `script`, `random`, `shipped:NAME` or the folder of a run."""
+    """Begin an episode.
+
+    Attributes:
+        player: `me`, `script`, `random`, `shipped:NAME` or the folder of a run. variant: as that of `Shown`.
+    """
 
     do: Literal["begin"]
-    seed: _Seed = 0
+    room: Room = Room()
     player: _Word = "me"
+    variant: _Word = ""
+
+
+class Show(_Message):
+    """Begin an episode, and play it as far as it is shown."""
+
+    do: Literal["show"]
+    shown: Shown
 
 
 class Act(_Message):
@@ -107,7 +147,29 @@ class Check(_Message):
     text: str
 
 
-_GameQuestion = Draw | Begin | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check
+class Test(_Message):
+    """Play the tests of a text that is to stand in the file `path`, and those in the file beside it."""
+
+    do: Literal["test"]
+    path: _Word
+    text: str
+
+
+class WriteTest(_Message):
+    """Make a test of what was played.
+
+    Attributes:
+        name: of the test. former: the text of the file that it is to stand in; None if there is none.
+    """
+
+    do: Literal["write_test"]
+    name: _Word
+    former: str | None = None
+
+
+_GameQuestion = (
+    Draw | Begin | Show | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check | Test | WriteTest
+)
 Question = Annotated[_GameQuestion, Field(discriminator="do")]
 QUESTIONS: Final[TypeAdapter[Question]] = TypeAdapter(Question)
 """What a process is asked."""
@@ -243,19 +305,21 @@ class Refused(_Message):
     lost: bool = False
 
 
-class Finding(BaseModel):
-    """A finding at a line and column from 1.
-
-    Attributes:
-        file: None where it is in the text itself.
-        help: what to do about it. notes: lines that say more.
-    """
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+class _Placed(_Part):
+    """Something that stands at a line and column from 1; `file` is None where it is in the text itself."""
 
     file: str | None
     line: int
     column: int
+
+
+class Finding(_Placed):
+    """A finding.
+
+    Attributes:
+        help: what to do about it. notes: lines that say more.
+    """
+
     message: str
     help: str | None
     notes: list[str]
@@ -263,7 +327,37 @@ class Finding(BaseModel):
     error: bool
 
 
-class Seat(BaseModel):
+class Claim(_Placed):
+    """What was found of a claim.
+
+    Attributes:
+        claim: as written. said: what was found, in words.
+        shown: a room that speaks against it, and what is done there.
+    """
+
+    claim: str
+    verdict: Literal["holds", "fails", "undecided"]
+    said: str
+    shown: Shown | None
+
+
+class TestResult(_Placed):
+    """What was found of a test.
+
+    Attributes:
+        test: its name. scenario: what was played. rooms: in how many. passes: in all of them.
+        findings: what is wrong. shown: the room in which it is, and what was done there up to that step.
+    """
+
+    test: str
+    scenario: str
+    rooms: int
+    passes: bool
+    findings: list[Finding]
+    shown: Shown | None
+
+
+class Seat(_Part):
     """What whoever plays gets, and nothing else.
 
     Attributes:
@@ -271,47 +365,42 @@ class Seat(BaseModel):
         compass: whether directions of others are those of a compass.
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
     told: str
     seen: str
     compass: bool
 
 
-class _Begun(_Message):
+class Episode(_Part):
+    """An episode as far as it was played.
+
+    Attributes:
+        phrases: what can be said. rules: names of all rules, whether they were asked or not.
+        seats: of each moment.
+    """
+
     trace: Trace
-    phrases: dict[str, list[str]]
+    phrases: list[str]
     rules: list[str]
     player: str
-    seed: int
-    seat: Seat
+    variant: str
+    room: Room
+    seats: list[Seat]
 
 
 class Drawn(_Message):
-    """Findings, and the game's beginning unless there are errors."""
+    """Findings, and the beginning of an episode unless there are errors or it is refused."""
 
     do: Literal["draw"]
     findings: list[Finding]
     refused: str | None = None
-    trace: Trace | None = None
-    phrases: dict[str, list[str]] | None = None
-    rules: list[str] | None = None
-    player: str | None = None
-    seed: int | None = None
-    seat: Seat | None = None
+    episode: Episode | None = None
 
 
-class Begun(_Begun):
-    """The beginning of an episode."""
+class Begun(_Message):
+    """An episode, at its beginning or, of `show`, as far as it is shown."""
 
-    do: Literal["begin"]
-
-
-class Placed(_Begun):
-    """The beginning of an episode, and the layout that leads to it."""
-
-    do: Literal["place"]
-    layout: dict[str, Any]
+    do: Literal["begin", "show", "place"]
+    episode: Episode
 
 
 class Stepped(_Message):
@@ -353,14 +442,47 @@ class Page(_Message):
 
 
 class Checked(_Message):
-    """The lines that `socialai check` prints."""
+    """What `socialai check` finds: claims, other findings, and in lines what was tried."""
 
     do: Literal["check"]
+    claims: list[Claim]
+    findings: list[Finding]
     lines: list[str]
 
 
+class Tested(_Message):
+    """What `socialai test` finds; findings alone if the text has mistakes."""
+
+    do: Literal["test"]
+    tests: list[TestResult]
+    findings: list[Finding]
+
+
+class WrittenTest(_Message):
+    """A test as text.
+
+    Attributes:
+        entry: the test. text: the file with it. beside: that file's name, without folders; None where it has no place.
+    """
+
+    do: Literal["write_test"]
+    entry: str
+    text: str
+    beside: str | None
+
+
 Answer = Annotated[
-    Refused | Drawn | Begun | Placed | Stepped | WentBack | LayoutOf | WrittenLayout | Page | Checked,
+    Refused
+    | Drawn
+    | Begun
+    | Stepped
+    | WentBack
+    | LayoutOf
+    | WrittenLayout
+    | Page
+    | Checked
+    | Tested
+    | WrittenTest,
     Field(discriminator="do"),
 ]
 ANSWERS: Final[TypeAdapter[Answer]] = TypeAdapter(Answer)

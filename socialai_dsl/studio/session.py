@@ -5,35 +5,46 @@ from __future__ import annotations
 import re
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.authoring.saving import NameTakenError
 from socialai_dsl.checking.briefing import NO_BRIEFING, brief
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity, printable
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.episodes.play import AGENT
-from socialai_dsl.episodes.policies import Policy, RandomPolicy
+from socialai_dsl.envs.options import reset_arguments
+from socialai_dsl.episodes.play import AGENT, OneEpisode, Rooms, play
+from socialai_dsl.episodes.policies import Policy, RandomPolicy, ReplayedPolicy
 from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.episodes.traces import Tracing, thought_of
-from socialai_dsl.frontend import Loaded, check, load
+from socialai_dsl.errors import OptionError, UsageError
+from socialai_dsl.frontend import Loaded, check, closest_script, load
 from socialai_dsl.library import prelude
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.resolved import taken_apart
+from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.semantics.typed import Phrases, split_line
-from socialai_dsl.source import Source
+from socialai_dsl.source import Source, Span
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
+from socialai_dsl.studio.messages import Room, Shown
 from socialai_dsl.traces import Thought, Tracer
 from socialai_dsl.traces.endings import endings_of
 from socialai_dsl.traces.page import replay_page
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
+if TYPE_CHECKING:
+    from socialai_dsl.analysis.reports import Report
+    from socialai_dsl.evaluation.testing import PlayedTest
+
 Reply = dict[str, Any]
 
+_FIRST: Final = Room()
 _CHECK_SECONDS: Final = 20.0
 _ENDED: Final = "the episode has ended; take steps back, or begin another"
 _FLOOR: Final = prelude().types["floor"].code
@@ -47,63 +58,87 @@ class Session:
     """The content of a window. Each method that a window may call returns its next content."""
 
     def __init__(self) -> None:
-        self._path = Path()
+        self._file = self._scenario = Path()
         self._texts: dict[Path, Source] = {}
         self._game: tuple[Stage, Tracing] | None = None
         self._phrases = Phrases((), Sentences((), (), ()))
         self._text_view: TextView | None = None
         self._briefing = NO_BRIEFING
-        self._player, self._seed = "me", 0
+        self._player, self._variant, self._room = "me", "", Room()
         self._policy: Policy = RandomPolicy(())
         self._prepared = False
 
-    def draw(self, path: str, text: str, seed: int = 0) -> Reply:
-        """Check a text that is to stand in a file, and draw its room if it is sound."""
-        self._path = Path(path)
-        self._texts = {self._path: Source(display_name(self._path), text)}
+    def draw(self, path: str, text: str, room: Room = _FIRST) -> Reply:
+        """Check a text that is to stand in a file, and draw its room if it is sound; of tests their scenario's."""
+        self._file, self._texts = Path(path), _texts(path, text)
         found = check(path, self._texts)
-        told = [_finding(one, display_name(self._path)) for one in found.diagnostics]
+        own = display_name(self._file)
+        told = [_finding(one, own) for one in found.diagnostics]
         if found.has_errors:
             return {"findings": told}
+        whole = found.whole
+        self._scenario = self._file if whole is None else whole.path
         try:
-            self._use(load(path, self._texts))
+            self._use(load(str(self._scenario), self._texts))
         except ScenarioError as error:  # it is sound, and nothing that can be played
-            return {
-                "findings": [*told, *(_finding(one, display_name(self._path)) for one in error.diagnostics)]
-            }
+            return {"findings": [*told, *(_finding(one, own) for one in error.diagnostics)]}
+        self._player, self._variant = "me", ""
         try:
-            return {"findings": told, **self.begin(seed)}
+            return {"findings": told, **self.begin(room)}
         except RefusalError as refusal:
             return {"findings": told, "refused": str(refusal)}
 
-    def begin(self, seed: int = 0, player: str = "me", layout: Any = None) -> Reply:
+    def begin(self, room: Room = _FIRST, player: str = "me", variant: str = "") -> Reply:
         """Begin an episode.
 
         Args:
-            seed: of the room.
+            room: which.
             player: `me`, `script`, `random`, `shipped:NAME`, or the folder of a run.
-            layout: a known room.
+            variant: variants and parameters behind the scenario's name.
         """
         if not self._texts:
             raise RefusalError("there is no scenario yet")
-        if player != self._player:
-            self._choose(player)
+        if (player, variant) != (self._player, self._variant):
+            self._choose(player, variant)
         stage, tracing = self._playing()
-        tracing.title = f"seed {seed}" if layout is None else "a layout"
+        tracing.title = _title(room)
         try:
-            stage.begin({"seed": seed, "options": None if layout is None else {"layout": layout}})
+            stage.begin(reset_arguments(**room.model_dump()))
         except (ValueError, RoomError) as error:
             raise RefusalError(str(error)) from None
-        self._seed = seed
+        self._room = room
         self._begin_anew()
+        return self._episode([self._seat()])
+
+    def show(self, shown: Shown) -> Reply:
+        """Begin an episode, and play it as far as it is shown; without acts a script plays, if there is one."""
+        player = "me"
+        if shown.acts is None:
+            player = "script" if self._has_script(shown.variant) else "me"
+        self.begin(shown.room, player, shown.variant)
+        stage, _ = self._playing()
+        seats = [self._seat()]
+        if player == "script":
+            while stage.running.all():
+                seats.append(self.auto()["seat"])
+        for line in shown.acts or ():
+            seats.append(self.act(line=line)["seat"])
+        return self._episode(seats)
+
+    def _episode(self, seats: list[Reply]) -> Reply:
+        """The episode as far as it was played, with what was seen and heard from the seat in each moment."""
+        stage, tracing = self._playing()
         return {
-            "trace": tracing.tracer.trace().model_dump(mode="json", exclude_defaults=True)
-            | {"format": "socialai-trace/1"},
-            "phrases": {"sentences": self._phrases.sentences()[:2000]},
-            "rules": list(stage.env.counters()["rules"]),
-            "player": self._player,
-            "seed": seed,
-            "seat": self._seat(),
+            "episode": {
+                "trace": tracing.tracer.trace().model_dump(mode="json", exclude_defaults=True)
+                | {"format": "socialai-trace/1"},
+                "phrases": self._phrases.sentences()[:2000],
+                "rules": list(stage.env.counters()["rules"]),
+                "player": self._player,
+                "variant": self._variant,
+                "room": self._room.model_dump(exclude_none=True),
+                "seats": seats,
+            }
         }
 
     def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
@@ -150,7 +185,7 @@ class Session:
         return {"length": to}
 
     def place(self, who: str, at: tuple[int, int]) -> Reply:
-        """Begin again in the same room with one thing somewhere else; the layout is told, too."""
+        """Begin again in the same room with one thing somewhere else."""
         stage, _ = self._playing()
         env: ScenarioEnv = stage.env
         described = env.describe()
@@ -172,7 +207,8 @@ class Session:
         cell = env.scene().codes[at[1], at[0]] if inside else None
         if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
             raise RefusalError(f"{who} cannot be put there")
-        return self.begin(self._seed, self._player, layout) | {"layout": layout}
+        known = self._room.model_copy(update={"layout": layout})
+        return self.begin(known, self._player, self._variant)
 
     def layout(self) -> Reply:
         """The room as it is now, as a layout that the commands take."""
@@ -187,11 +223,11 @@ class Session:
         """
         stage, _ = self._playing()
         described = stage.env.describe()
-        layout, stem = start_layout(described), self._path.stem
-        loaded = load(str(self._path), {self._path: Source(display_name(self._path), text)})
+        layout, stem = start_layout(described), self._scenario.stem
+        loaded = load(str(self._scenario), _texts(self._file, text))
         if not isinstance(loaded, LoadedSuite):
             name = f"{re.sub(r'[^a-zA-Z0-9_]', '_', stem)}_known"
-            return {"suite": suite_text(name, self._path.name, layout), "name": f"{name}.yaml"}
+            return {"suite": suite_text(name, self._scenario.name, layout), "name": f"{name}.yaml"}
         if loaded.suite.members is None or loaded.suite.sweep is not None or loaded.in_sequence:
             raise RefusalError("members that are acts or made by a tree or sweep get their layouts by hand")
         suite = loaded.resolved.tree
@@ -206,18 +242,66 @@ class Session:
         return {"page": replay_page([tracing.tracer.trace().portable()])}
 
     def check(self, path: str, text: str) -> Reply:
-        """What `socialai check` says of a text."""
+        """What `socialai check` finds of a text."""
         from socialai_dsl.analysis.check import check_scenario
         from socialai_dsl.analysis.effort import Clock, Effort
 
+        own, texts = display_name(Path(path)), _texts(path, text)
         try:
-            loaded = load(path, {Path(path): Source(display_name(Path(path)), text)})
+            loaded = load(path, texts)
         except ScenarioError as error:
-            return {"lines": [f"{one.span}: {one.text}" for one in error.diagnostics]}
+            return {"claims": [], "findings": [_finding(one, own) for one in error.diagnostics], "lines": []}
         if not isinstance(loaded, LoadedScenario):
             raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
         effort = Effort(100, 0, clock=Clock(_CHECK_SECONDS, lambda said: None))
-        return {"lines": list(check_scenario(loaded, display_name(Path(path)), effort).lines())}
+        report = check_scenario(loaded, path, effort, texts=texts)
+        report.scenario = own
+        return {
+            "claims": [_claim(plan, found, report.seed, own) for plan, found in report.tried],
+            "findings": [_finding(one, own) for one in report.parts()],
+            "lines": list(report.summary()),
+        }
+
+    def test(self, path: str, text: str) -> Reply:
+        """What `socialai test` finds of a text."""
+        from socialai_dsl.evaluation.testing import play_tests
+
+        own = display_name(Path(path))
+        try:
+            played = play_tests([path], texts=_texts(path, text))
+        except ScenarioError as error:
+            return {"tests": [], "findings": [_finding(one, own) for one in error.diagnostics]}
+        except UsageError:
+            raise RefusalError("there are no tests yet; play, and make one of what was played") from None
+        return {"tests": [_test(one, own) for one in played], "findings": []}
+
+    def write_test(self, name: str, former: str | None = None) -> Reply:
+        """What was played as a test, and the file beside the scenario with it."""
+        from socialai_dsl.evaluation.saving import TakenDialogue, written_test
+
+        stage, tracing = self._playing()
+        if not stage.steps:
+            raise RefusalError("nothing was played yet; a test is made of what was played")
+        called, reset = f"{self._scenario}{self._variant}", reset_arguments(**self._room.model_dump())
+        taken = TakenDialogue()
+        loaded = load(called, self._texts)
+        rooms = Rooms(ScenarioEnv(compile_loaded(loaded), scenarios=scenarios_of(loaded)), [taken])
+        actions = [np.array(moment.action, np.int64) for moment in tracing.tracer.moments[1:]]
+        play(rooms, {AGENT: ReplayedPolicy(actions)}, OneEpisode(reset))
+
+        def read(beside: Path) -> Source | None:
+            return None if former is None else Source(display_name(beside), former, beside)
+
+        try:
+            written = written_test(taken, called, reset, name, read, texts=self._texts)
+        except NameTakenError as taken_name:
+            raise RefusalError(f"{taken_name}; choose another name") from None
+        except OptionError as error:
+            raise RefusalError(error.said) from None
+        except UsageError as error:
+            raise RefusalError(str(error)) from None
+        beside = None if written.beside is None else written.beside.name
+        return {"entry": written.entry, "text": written.text, "beside": beside}
 
     # -- within ----------------------------------------------------------------------------------------------
 
@@ -230,26 +314,28 @@ class Session:
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
         tracing = Tracing(Tracer(env, loaded.name, "me", endings, about_of(loaded)))
         self._game = Stage(env, [tracing]), tracing
-        self._player, self._policy, self._prepared = "me", RandomPolicy(self._game[0].action_sizes), False
+        self._policy, self._prepared = RandomPolicy(self._game[0].action_sizes), False
 
     def _begin_anew(self) -> None:
         """Let the player forget everything."""
-        self._policy.reset(np.ones(1, np.bool_), np.array([self._seed]))
+        self._policy.reset(np.ones(1, np.bool_), np.array([self._room.seed]))
 
-    def _choose(self, player: str) -> None:
-        """Change the player."""
-        path = str(self._path)
-        loaded = load(path, self._texts)
-        if player == "script" and unscripted(loaded):
-            try:
-                loaded = load(f"{path}+oracle", self._texts)
-            except ScenarioError as error:
-                known = all(one.code == "S503" for one in error.diagnostics)
-                said = "" if known else f": {error.diagnostics[0].text}"
-                raise RefusalError(f"the agent has no script: there is no variant `oracle`{said}") from None
+    def _has_script(self, variant: str) -> bool:
+        """Whether the agent of a variant has a script."""
+        return not unscripted(closest_script(f"{self._scenario}{variant}", texts=self._texts).loaded)
+
+    def _choose(self, player: str, variant: str) -> None:
+        """Change the player, or what is played."""
+        name = f"{self._scenario}{variant}"
+        loaded = load(name, self._texts)
+        if player == "script":
+            loaded = closest_script(name, loaded, self._texts).loaded
             if unscripted(loaded):
-                raise RefusalError("the variant `oracle` gives the agent no frame")
+                raise RefusalError(
+                    "the agent has no script: it follows no frame, and there is no variant `oracle`"
+                )
         self._use(loaded)
+        self._player, self._variant = "me", variant
         stage, tracing = self._playing()
         if player != "me":
             self._policy = _policy("oracle" if player == "script" else player, stage.env)
@@ -291,6 +377,7 @@ class Session:
 ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "draw": Session.draw,
     "begin": Session.begin,
+    "show": Session.show,
     "act": Session.act,
     "auto": Session.auto,
     "back": Session.back,
@@ -299,6 +386,8 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "write_layout": Session.write_layout,
     "replay": Session.replay,
     "check": Session.check,
+    "test": Session.test,
+    "write_test": Session.write_test,
 }
 """What a window may ask a session for, by name."""
 
@@ -316,11 +405,54 @@ def _policy(run: str, env: Any) -> Policy:
         raise RefusalError(f"{run}: {error}") from None
 
 
+def _texts(path: str | Path, text: str) -> dict[Path, Source]:
+    """The text of a file in place of what it holds."""
+    return {Path(path): Source(display_name(Path(path)), text)}
+
+
+def _title(room: Room) -> str:
+    """Which room it is, in words."""
+    if room.layout is not None:
+        return "a layout"
+    if room.test_episode is not None:
+        return f"test episode {room.test_episode}"
+    return f"seed {room.seed}" + ("" if room.index is None else f", room {room.index}")
+
+
+def _place(span: Span, own: str) -> Reply:
+    return {"file": None if span.file == own else span.file, "line": span.line, "column": span.column}
+
+
+def _claim(plan: PropertyPlan, found: Report, seed: int, own: str) -> Reply:
+    """A claim, with the first room that speaks against it; what is done there, or who plays there."""
+    shown = None
+    if found.against and found.verdict.value != "holds":
+        variant = f"+{plan.rival}" if plan.rival else ""
+        acts = list(found.acts) or None
+        shown = {"room": {"seed": seed, "index": found.against[0]}, "variant": variant, "acts": acts}
+    verdict = {"claim": plan.text, "verdict": found.verdict.value, "said": found.said, "shown": shown}
+    return {**_place(plan.span, own), **verdict}
+
+
+def _test(played: PlayedTest, own: str) -> Reply:
+    """A test, with the room and the acts after which something is wrong."""
+    result, performed = played.as_object(), played.performed
+    shown = None
+    if played.fails and performed.reset:
+        room = {"seed": performed.reset.get("seed", 0), **(performed.reset["options"] or {})}
+        variant = taken_apart(played.called)[1]
+        shown = {"room": room, "variant": variant, "acts": list(performed.done)}
+    return {
+        **_place(played.plan.span, own),
+        **{key: result[key] for key in ("test", "scenario", "rooms", "passes")},
+        "findings": [_finding(one, own) for one in played.outcome.diagnostics],
+        "shown": shown,
+    }
+
+
 def _finding(found: Diagnostic, own: str) -> Reply:
     return {
-        "file": None if found.span.file == own else found.span.file,
-        "line": found.span.line,
-        "column": found.span.column,
+        **_place(found.span, own),
         "message": found.text,
         "help": None if found.hint is None else printable(found.hint),
         "notes": [printable(note) for note in found.notes],

@@ -111,7 +111,7 @@ class Window:
         if isinstance(asked, messages.FileQuestion):
             lane = self._files
         else:
-            lane = self._claims if isinstance(asked, messages.Check) else self._plays
+            lane = self._claims if isinstance(asked, messages.Check | messages.Test) else self._plays
         try:
             lane.put_nowait(asked)
         except asyncio.QueueFull:

@@ -96,7 +96,7 @@ class Desk:
             self._session.prepare()
 
     def _reply(self, question: Question) -> dict[str, Any]:
-        more = question.model_dump(exclude={"id", "do"})
+        more = {name: value for name, value in question if name not in ("id", "do")}
         if "path" in more:
             more["path"] = str(self._folder.path(more["path"]))
         if "player" in more:

@@ -22,6 +22,8 @@ from socialai_dsl.llm import Episode, TextView
 
 pytest.importorskip("starlette", reason="no test of the studio without the extra `studio`")
 
+from tests.socialai_dsl.studio.shy import SHY
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -436,6 +438,83 @@ def place(page: Page, who: str) -> tuple[int, int]:
     at = re.search(rf"{who} \([^)]*\) at (\d+), (\d+)", room(page))
     assert at is not None
     return int(at[1]), int(at[2])
+
+
+@pytest.fixture
+def shy(page: Page, server: Server, folder: Path) -> Page:
+    """The studio with a scenario of which claims and tests fail."""
+    (folder / "talkitout.yaml").rename(folder / "other.yaml")
+    (folder / "talkitout_oracle.yaml").unlink()
+    (folder / "talkitout.yaml").write_text(SHY)
+    page.goto(server.address)
+    drawn(page)
+    return page
+
+
+def test_a_violated_claim_stands_beside_its_line_and_opens_its_room(shy: Page) -> None:
+    shy.get_by_role("button", name="Check the claims").click()
+    claim = shy.get_by_role("list", name="claims").get_by_role("listitem").filter(has_text="never")
+    claim.get_by_text("✗ fails").wait_for(timeout=90_000)
+    assert "it can come about in 100 of 100 rooms" in claim.inner_text()
+    assert shy.get_by_role("tab", name="Claims 2 of 4").get_attribute("aria-selected") == "true"
+    box = claim.bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] < 800, "it is seen without scrolling"
+    shy.locator(".cm-line", has_text="check:").locator(".cm-verdict", has_text="✗ fails").first.wait_for()
+    claim.get_by_role("button", name="Show room 0 of seed 0").click()
+    reach(shy, 2)
+    shy.locator(".cast td.changed", has_text="helped").wait_for()
+    shy.locator(".transcript li.now", has_text="Go to the green door.").wait_for()
+    rival = shy.get_by_role("listitem").filter(has_text="rival: hasty")
+    rival.get_by_role("button", name="Show room").click()
+    shy.locator(".message.good", has_text="success").wait_for()
+    assert shy.get_by_label("who plays").input_value() == "script"
+    # What is found is about the text as it was.
+    shy.locator(".cm-content").get_by_text("horizon", exact=True).click()
+    shy.keyboard.press("End")
+    shy.keyboard.type("0")
+    until(shy, lambda: shy.locator(".cm-verdict").count() == 0)
+    assert "outdated" in (shy.locator("#claims-panel > div").get_attribute("class") or "")
+
+
+def test_a_failing_test_opens_at_its_step_and_play_becomes_a_test(shy: Page, folder: Path) -> None:
+    shy.get_by_role("button", name="Run the tests").click()
+    failing = shy.get_by_role("list", name="tests").get_by_role("listitem").filter(has_text="told_from_afar")
+    failing.get_by_text("distance(agent) <= 2 is false: distance(agent) is 3").wait_for()
+    shy.get_by_role("listitem").filter(has_text="gives_up").get_by_text("✓ passes").wait_for()
+    failing.get_by_role("button", name="Show room 0 of seed 0").click()
+    reach(shy, 2)
+    shy.locator(".transcript li.now", has_text="Where is the exit").wait_for()
+    shy.keyboard.press("ArrowUp")
+    reach(shy, 3)
+
+    beside = folder / "talkitout.tests.yaml"
+    shy.get_by_role("button", name="Make a test…").click()
+    shy.get_by_label("name of the test").fill("from_afar")
+    assert "from_afar:" in shy.get_by_label("the test", exact=True).inner_text()
+    assert not beside.exists()
+    with another_room(shy):
+        shy.get_by_role("button", name="Put it into talkitout.tests.yaml").click()
+    shy.get_by_text("talkitout.tests.yaml was made, with the test").wait_for()
+    first = beside.read_text()
+    assert "from_afar:" in first
+
+    # Another one is put into the text, and is written when that is saved.
+    shy.locator(".stage").click()
+    shy.keyboard.press("x")
+    reach(shy, 1)
+    shy.get_by_role("button", name="Make a test…").click()
+    shy.get_by_label("name of the test").fill("gives_up")
+    shy.get_by_role("button", name="Put it into talkitout.tests.yaml").click()
+    shy.get_by_text("not saved; a draft is kept").wait_for()
+    assert beside.read_text() == first
+    shy.get_by_role("button", name="Run the tests").click()
+    shy.get_by_role("tab", name="Tests ✓").wait_for()
+    assert shy.get_by_role("list", name="tests").get_by_role("listitem").count() == 2
+    shy.locator(".cm-content").focus()
+    shy.keyboard.press("Control+s")
+    until(shy, lambda: "gives_up:" in beside.read_text())
+    assert first.removesuffix("\n") in beside.read_text()
 
 
 def test_the_wizard_is_dragged(studio: Page) -> None:

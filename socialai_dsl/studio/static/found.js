@@ -8,6 +8,7 @@ import { make } from "./dom.js";
  * @typedef {object} Ways
  * @property {(place: {file: string | null, line: number, column: number}) => void} goTo
  * @property {(code: string) => void} explain
+ * @property {(shown: Shown) => void} show
  */
 
 /** A list of findings; each leads to its place and to the page about its code.
@@ -48,4 +49,54 @@ export function page(text) {
     else made.append(make("pre", { class: language }, code));
   }
   return made;
+}
+
+/** @typedef {{room: Record<string, any>, variant: string, acts: string[] | null}} Shown */
+/** @typedef {{file: string | null, line: number, column: number, claim: string, verdict: "holds" | "fails" | "undecided", said: string, shown: Shown | null}} Claim */
+/** @typedef {{file: string | null, line: number, column: number, test: string, scenario: string, rooms: number, passes: boolean, findings: Finding[], shown: Shown | null}} TestResult */
+
+/** @type {Record<string, {kind: "good" | "bad" | "open", text: string}>} */
+const VERDICTS = {
+  holds: { kind: "good", text: "✓ holds" },
+  fails: { kind: "bad", text: "✗ fails" },
+  undecided: { kind: "open", text: "? undecided" },
+  passes: { kind: "good", text: "✓ passes" },
+};
+
+/** @param {{verdict: string} | {passes: boolean}} one */
+export const verdictOf = (one) => VERDICTS["verdict" in one ? one.verdict : one.passes ? "passes" : "fails"];
+
+/** A list of claims, each with its verdict, what was found, and the room that speaks against it.
+ * @param {Claim[]} claims @param {Ways} ways */
+export function claimItems(claims, ways) {
+  return claims.map((one) => make("li", { class: verdictOf(one).kind, onclick: besides(() => ways.goTo(one)) },
+    make("p", {}, make("b", { class: "verdict" }, verdictOf(one).text), " ", placeButton(one, ways), " ", make("code", {}, one.claim)),
+    make("p", { class: "help" }, ...marked(one.said)),
+    ...(one.shown ? [showButton(one.shown, ways)] : [])));
+}
+
+/** A list of tests; of one that fails with what is wrong, and the room in which it is.
+ * @param {TestResult[]} tests @param {Ways} ways */
+export function testItems(tests, ways) {
+  return tests.map((one) => make("li", { class: verdictOf(one).kind, onclick: besides(() => ways.goTo(one)) },
+    make("p", {}, make("b", { class: "verdict" }, verdictOf(one).text), " ", placeButton(one, ways), " ", make("code", {}, one.test),
+      make("small", { class: "quiet" }, ` ${one.scenario}${one.rooms > 1 ? `, in ${one.rooms} rooms` : ""}`)),
+    ...one.findings.flatMap((finding) => [
+      make("p", { class: "help" }, placeButton(finding, ways), " ", ...marked(finding.message)),
+      ...(finding.notes.length ? [make("pre", {}, finding.notes.join("\n"))] : []),
+    ]),
+    ...(one.shown ? [showButton(one.shown, ways)] : [])));
+}
+
+/** @param {Shown} shown @param {Ways} ways */
+function showButton(shown, ways) {
+  const { acts } = shown;
+  const what = acts === null ? "let the script play there, if there is one" : acts.length ? `then: ${acts.join(", ")}` : "before the first step";
+  return make("p", { class: "help" }, make("button", { onclick: () => ways.show(shown) }, `▸ Show ${roomInWords(shown)}`), make("small", { class: "quiet" }, ` ${what}`));
+}
+
+/** @param {Shown} shown */
+export function roomInWords({ room, variant }) {
+  const which = room.test_episode !== undefined ? `test episode ${room.test_episode}` : `room ${room.index ?? 0} of seed ${room.seed ?? 0}`;
+  return `${which}${room.layout ? ", as it is laid out" : ""}${variant ? `, ${variant}` : ""}`;
 }

@@ -3,7 +3,7 @@
 import { make } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
-import { findingItems, page } from "./found.js";
+import { claimItems, findingItems, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
 import { Counts, Seat } from "./parts.js";
 import { Episode, slotsOf } from "./trace.js";
@@ -24,7 +24,9 @@ class Studio {
     /** @type {string | null} */ this.digest = null;
     this.saved = "";
     this.dirty = false;
-    this.seed = 0;
+    /** What is played: the room, and variants and parameters behind the scenario's name.
+     * @type {{room: Record<string, any>, variant: string}} */
+    this.place = { room: { seed: 0 }, variant: "" };
     this.length = 0;
     /** @type {Episode | null} */ this.episode = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */ this.timer = undefined;
@@ -37,6 +39,7 @@ class Studio {
     this.ways = {
       goTo: ({ file, line, column }) => (file ? this.editorAt(`${file}:${line}`, column) : this.editor.goTo(line, column)),
       explain: (code) => this.explain(code),
+      show: (shown) => this.reveal(shown),
     };
     this.stage = new Stage();
     this.counts = new Counts(goTo);
@@ -51,8 +54,9 @@ class Studio {
     this.sound = make("p", { class: "quiet" }, "Nothing is wrong.");
     this.message = make("p", { class: "message", role: "status" });
     this.title = make("h1", {}, "studio");
-    this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.begin(Number(this.seedField.value)) });
-    this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin(this.seed) });
+    this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.another({ seed: Number(this.seedField.value) }) });
+    this.roomField = make("input", { type: "number", min: 0, value: 0, "aria-label": "number of the room", title: "which room of the seed, as checks number them", onchange: () => this.another({ seed: Number(this.seedField.value), index: Number(this.roomField.value) }) });
+    this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin() });
     this.seated = make("input", { type: "checkbox", onchange: () => this.sit() });
     this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
     this.count = make("output", {});
@@ -65,10 +69,13 @@ class Studio {
     this.words = make("span", { class: "words" });
     this.sentences = make("datalist", { id: "sentences" });
     this.typed = make("input", { list: "sentences", placeholder: "or type: forward, How are you …", "aria-label": "what to do or say" });
-    this.checked = make("div", { class: "checked" }, make("p", { class: "quiet" }, "Nothing was checked yet."));
+    this.claims = make("div", {}, make("p", { class: "quiet" }, "Nothing was checked yet."));
+    this.tests = make("div", {}, make("p", { class: "quiet" }, "No test was played yet."));
+    /** @type {Record<string, import("./editor.js").Verdict[]>} what the editor shows behind lines, by tab */ this.verdicts = {};
     this.dialog = make("dialog");
+    const testing = make("button", { onclick: () => this.test(), title: "play the tests of this file and of the file beside it" }, "Run the tests");
     const checking = make("button", { onclick: () => this.check(), title: "try in a hundred rooms what the scenario claims; it takes up to 20 seconds" }, "Check the claims");
-    this.writing = new Writing({ Findings: make("div", {}, this.findings, this.sound), Claims: this.checked }, checking);
+    this.writing = new Writing({ Findings: make("div", {}, this.findings, this.sound), Claims: this.claims, Tests: this.tests }, checking, testing);
     this.wraps = make("input", { type: "checkbox", checked: settings.get("wraps", "yes") === "yes", onchange: () => this.wrap() });
     this.root = this.layout(parts);
     document.body.replaceChildren(this.root);
@@ -92,8 +99,8 @@ class Studio {
       button("Replay", () => this.export("replay"), "save this episode as a page of its own"),
       button("◐", () => this.shade(), "light or dark"));
     const game = make("div", { class: "controls" },
-      button("⟲ again", () => this.begin(this.seed), "begin the episode again (R)"),
-      button("Another room", () => this.begin(this.seed + 1), "the next seed (N)"), make("label", {}, "seed ", this.seedField),
+      button("⟲ again", () => this.begin(), "begin the episode again (R)"),
+      button("Another room", () => this.next(), "the next seed (N)"), make("label", {}, "seed ", this.seedField), make("label", {}, "room ", this.roomField),
       button("◂ step back", () => this.back(this.length - 1), "take the last step back, chance included (U)"), this.count,
       make("label", {}, "plays: ", this.players),
       make("label", { title: "hide the room, the states, the rules and the text" }, this.seated, " as the agent sees it"), this.watch,
@@ -102,7 +109,8 @@ class Studio {
       this.template, this.words, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
     const arrange = make("div", { class: "controls arrange" }, make("label", {}, "thing ", this.thing),
       button("Move it", () => this.moving(this.placeOf(this.thing.value)), "then by the arrow keys; Enter puts it down, Esc leaves it (M)"),
-      button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"));
+      button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"),
+      button("Make a test…", () => this.offerTest(), "keep what was played as a test: what was done, heard and reached"));
     const help = make("details", { class: "panel" }, make("summary", {}, "Keys and colours"),
       make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
     return make("div", { class: "studio" }, bar,
@@ -151,7 +159,8 @@ class Studio {
     if (found.refused) return stay(found.refused);
     const same = name === this.name, back = found.draft !== null;
     // A draft is saved against the file that it was begun with, so that what was saved since is not written over unseen.
-    Object.assign(this, { name, digest: back ? found.base : found.digest, saved: found.text, seed: same ? this.seed : 0 });
+    Object.assign(this, { name, digest: back ? found.base : found.digest, saved: found.text, place: same ? this.place : { room: { seed: 0 }, variant: "" } });
+    if (!same) this.forget();
     this.files.value = name;
     document.title = this.title.textContent = name;
     this.players.value = "me";
@@ -170,6 +179,7 @@ class Studio {
   typedText() {
     if (!this.name) return;
     this.mark();
+    this.outdate();
     clearTimeout(this.later.draw);
     this.later.draw = setTimeout(() => this.draw(), DRAW_AFTER);
     clearTimeout(this.later.keep);
@@ -318,7 +328,7 @@ class Studio {
     }
     this.drawing = true;
     this.pause();
-    const text = this.editor.text, drawn = await this.line.ask("draw", { path: this.name, text, seed: this.seed });
+    const text = this.editor.text, drawn = await this.line.ask("draw", { path: this.name, text, room: this.place.room });
     this.drawing = false;
     if (this.again) {
       this.again = false;
@@ -330,13 +340,12 @@ class Studio {
     this.sound.hidden = findings.length > 0;
     this.writing.count("Findings", findings.length ? String(findings.length) : "", findings.some((/** @type {Reply} */ one) => one.error) ? "bad" : "open");
     if (findings.some((/** @type {Reply} */ one) => one.error)) this.writing.choose("Findings");
-    this.stage.root.classList.toggle("stale", !drawn.trace);
-    if (drawn.trace) {
+    this.stage.root.classList.toggle("stale", !drawn.episode);
+    if (drawn.episode) {
       this.counts.forget();
       this.episode = null;
-      this.players.value = drawn.player;
       this.tell("");
-      this.take(drawn);
+      this.take(drawn.episode);
     } else this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
   }
 
@@ -344,11 +353,13 @@ class Studio {
   take(begun) {
     if (this.episode) this.counts.keep(this.episode);
     this.episode = new Episode(begun.trace);
-    this.seat.moments = [begun.seat];
+    this.seat.moments = begun.seats;
     this.counts.names = begun.rules;
-    this.length = 0;
-    this.seed = begun.seed;
-    this.seedField.value = String(begun.seed);
+    this.length = this.episode.length;
+    this.players.value = begun.player;
+    this.place = { room: begun.room, variant: begun.variant };
+    this.seedField.value = String(begun.room.seed);
+    this.roomField.value = String(begun.room.index ?? 0);
     document.body.dataset.rooms = String(Number(document.body.dataset.rooms ?? 0) + 1);
     const { actions, templates } = this.episode.trace;
     const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
@@ -365,15 +376,15 @@ class Studio {
       return select;
     }));
     this.offerWords();
-    this.sentences.replaceChildren(...begun.phrases.sentences.map((/** @type {string} */ said) => make("option", { value: said })));
+    this.sentences.replaceChildren(...begun.phrases.map((/** @type {string} */ said) => make("option", { value: said })));
     this.moves.replaceChildren(...[...actions, "none"].map((word) => make("button", { onclick: () => this.act({ movement: word === "none" ? null : word }) }, word)));
     this.show();
   }
 
-  /** @param {number} seed */
-  async begin(seed) {
+  /** Begin an episode where the last one was, or elsewhere. */
+  async begin({ room, variant } = this.place) {
     this.pause();
-    const begun = await this.line.ask("begin", { seed, player: this.players.value || "me" });
+    const begun = await this.line.ask("begin", { room, variant, player: this.players.value || "me" });
     if (begun.refused) {
       this.tell(begun.refused);
       if (!begun.lost) this.players.value = "me";
@@ -381,7 +392,32 @@ class Studio {
       return;
     }
     this.tell("");
-    this.take(begun);
+    this.take(begun.episode);
+  }
+
+  /** Begin in another room, without what was known of the last one. @param {Record<string, any>} room */
+  another(room) {
+    this.begin({ room, variant: "" });
+  }
+
+  /** The next seed. */
+  next() {
+    this.another({ seed: (this.place.room.seed ?? 0) + 1 });
+  }
+
+  /** Show what was found in a room, at its step. @param {import("./found.js").Shown} shown */
+  async reveal(shown) {
+    this.pause();
+    this.tell("playing …");
+    const begun = await this.line.ask("show", { shown });
+    if (begun.refused) {
+      this.tell(begun.refused);
+      if (begun.lost) this.draw();
+      return;
+    }
+    this.tell(roomInWords(shown));
+    this.take(begun.episode);
+    this.stage.root.scrollIntoView({ block: "nearest" });
   }
 
   /** @param {Reply} what */
@@ -482,7 +518,7 @@ class Studio {
     if (this.length) await this.back(0);
     const done = await this.line.ask("place", { who, at });
     if (done.refused) return this.tell(done.refused);
-    this.take(done);
+    this.take(done.episode);
     this.tell(`${who} was put at ${at.join(", ")}; “Layout…” begins episodes so`);
   }
 
@@ -526,10 +562,96 @@ class Studio {
     this.ask(`Every episode can begin in the room as it is now. What a layout leaves out is drawn. ${written.refused ?? ""}`, [...own, toFile, ["Close", () => {}]]);
   }
 
+  /** Try what the text claims. */
   async check() {
-    this.checked.replaceChildren(make("p", { class: "quiet" }, "checking …"));
-    const done = await this.line.ask("check", { path: this.name, text: this.editor.text });
-    this.checked.replaceChildren(make("pre", {}, done.refused ?? done.lines.join("\n")));
+    const done = await this.find("Claims", this.claims, "check", "checking, which takes up to 20 seconds …");
+    if (!done) return;
+    const open = done.claims.filter((/** @type {import("./found.js").Claim} */ one) => one.verdict !== "holds");
+    this.claims.replaceChildren(
+      make("ul", { "aria-label": "claims" }, ...claimItems(done.claims, this.ways), ...findingItems(done.findings, this.ways)),
+      ...done.lines.map((/** @type {string} */ line) => make("p", { class: "quiet" }, line)));
+    this.judge("Claims", done.claims, open.length);
+  }
+
+  /** Play the tests of the text. */
+  async test() {
+    const done = await this.find("Tests", this.tests, "test", "playing the tests …");
+    if (!done) return;
+    const failed = done.tests.filter((/** @type {import("./found.js").TestResult} */ one) => !one.passes);
+    this.tests.replaceChildren(make("ul", { "aria-label": "tests" }, ...testItems([...failed, ...done.tests.filter((/** @type {Reply} */ one) => one.passes)], this.ways), ...findingItems(done.findings, this.ways)));
+    this.judge("Tests", done.tests, failed.length);
+  }
+
+  /** Ask what is found of the text, and show in a tab that it is looked for.
+   * @param {string} tab @param {HTMLElement} panel @param {"check" | "test"} question @param {string} meanwhile */
+  async find(tab, panel, question, meanwhile) {
+    const { name } = this, { text } = this.editor;
+    this.writing.choose(tab);
+    panel.classList.remove("outdated");
+    panel.replaceChildren(make("p", { class: "quiet", role: "status" }, meanwhile));
+    const done = await this.line.ask(question, { path: name, text });
+    if (name !== this.name) return null;
+    if (done.refused) panel.replaceChildren(make("p", { class: "quiet", role: "status" }, done.refused));
+    if (text !== this.editor.text) panel.classList.add("outdated");
+    return done.refused ? null : done;
+  }
+
+  /** Show verdicts behind the lines that they are about, and on the tab how many are not as they should be.
+   * @param {string} tab @param {(import("./found.js").Claim | import("./found.js").TestResult)[]} found @param {number} open */
+  judge(tab, found, open) {
+    this.verdicts[tab] = found.filter((one) => !one.file).map((one) => ({ line: one.line, ...verdictOf(one) }));
+    this.editor.judge(Object.values(this.verdicts).flat());
+    this.writing.count(tab, found.length ? (open ? `${open} of ${found.length}` : "✓") : "", open ? "bad" : "good");
+  }
+
+  /** Verdicts are about the text before a change. */
+  outdate() {
+    if (Object.keys(this.verdicts).length) this.editor.judge([]);
+    this.verdicts = {};
+    for (const panel of [this.claims, this.tests]) if (panel.querySelector("li")) panel.classList.add("outdated");
+    for (const tab of ["Claims", "Tests"]) this.writing.count(tab, "");
+  }
+
+  /** Nothing was found of another file. */
+  forget() {
+    this.verdicts = {};
+    for (const panel of [this.claims, this.tests]) panel.classList.remove("outdated");
+    this.claims.replaceChildren(make("p", { class: "quiet" }, "Nothing was checked yet."));
+    this.tests.replaceChildren(make("p", { class: "quiet" }, "No test was played yet."));
+    for (const tab of ["Claims", "Tests"]) this.writing.count(tab, "");
+  }
+
+  /** What was played becomes a test, which is shown first, and then put into the text of the file beside. */
+  async offerTest() {
+    const made = await this.line.ask("write_test", { name: "my_test" });
+    if (made.refused) return this.tell(made.refused);
+    const folder = this.name.replace(/[^/]*$/, ""), beside = made.beside === null ? null : `${folder}${made.beside}`;
+    const called = make("input", { value: "my_test", "aria-label": "name of the test", oninput: () => (text.textContent = made.entry.replace("my_test", called.value.trim())) });
+    const text = make("pre", { tabindex: 0, "aria-label": "the test" }, made.entry);
+    /** @type {[string, () => void][]} */
+    const own = beside ? [[`Put it into ${beside}`, () => this.putTest(called.value.trim(), beside)]] : [];
+    this.ask(`A test of what was played. ${beside ? `It is put into the text of ${beside}, where you save it or take it back.` : ""}`,
+      [...own, ["Close", () => {}]], make("label", {}, "Name ", called), text);
+  }
+
+  /** @param {string} name of the test @param {string} beside the file */
+  async putTest(name, beside) {
+    const isThere = (this.offered?.files ?? []).includes(beside), open = beside === this.name;
+    const found = isThere && !open ? await this.line.ask("read", { name: beside }) : {};
+    if (found.refused) return this.tell(found.refused);
+    const former = open ? this.editor.text : isThere ? (found.draft ?? found.text) : null;
+    const made = await this.line.ask("write_test", { name, former });
+    if (made.refused) return this.tell(made.refused);
+    if (!isThere) {
+      const added = await this.line.ask("add", { name: beside, text: made.text });
+      if (added.refused) return this.tell(added.refused);
+      await this.list();
+      await this.openFile(added.name);
+      return this.tell(`${added.name} was made, with the test`);
+    }
+    if (!open) await this.openFile(beside);
+    this.editor.replace(made.text);
+    this.tell(`the test was put into the text; save it, or take it back by Ctrl-Z`);
   }
 
   /** @param {"replay" | "layout"} what */
@@ -590,8 +712,8 @@ class Studio {
       m: () => this.thing.focus(),
       u: () => this.back(this.length - 1),
       Backspace: () => this.back(this.length - 1),
-      r: () => this.begin(this.seed),
-      n: () => this.begin(this.seed + 1),
+      r: () => this.begin(),
+      n: () => this.next(),
       l: () => {
         this.stage.letters = !this.stage.letters;
         this.show();

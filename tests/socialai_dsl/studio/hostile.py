@@ -9,8 +9,12 @@ from typing import Any
 from hypothesis import strategies as st
 
 GAME: list[dict[str, Any]] = [
-    {"do": "draw", "path": "talkitout.yaml", "text": "scenario: x\n", "seed": 3},
-    {"do": "begin", "seed": 3, "player": "random"},
+    {"do": "draw", "path": "talkitout.yaml", "text": "scenario: x\n", "room": {"seed": 3, "layout": {}}},
+    {"do": "begin", "room": {"seed": 3, "index": 2}, "player": "random", "variant": ""},
+    {
+        "do": "show",
+        "shown": {"room": {"test_episode": 1}, "variant": "+oracle", "acts": ["left", "How are you"]},
+    },
     {"do": "act", "movement": "left", "sentence": None, "line": None},
     {"do": "act", "line": "forward How are you"},
     {"do": "auto"},
@@ -20,6 +24,8 @@ GAME: list[dict[str, Any]] = [
     {"do": "write_layout", "text": "scenario: x\n"},
     {"do": "replay"},
     {"do": "check", "path": "talkitout.yaml", "text": "scenario: x\n"},
+    {"do": "test", "path": "talkitout.yaml", "text": "scenario: x\n"},
+    {"do": "write_test", "name": "mine", "former": "tests_of: talkitout.yaml\ntests:\n"},
 ]
 FILES: list[dict[str, Any]] = [
     {"do": "hello", "window": None},

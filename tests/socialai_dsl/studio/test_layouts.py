@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 import socialai_dsl as sd
+from socialai_dsl.studio.messages import Room
 from socialai_dsl.studio.session import RefusalError, Session
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -37,9 +38,9 @@ def drawn(path: Path, text: str, member: str = "talkitout") -> Session:
     """A session that shows a room of this member of a suite, or of a scenario."""
     session = Session()
     for seed in range(50):
-        shown = session.draw(str(path), text, seed)
+        shown = session.draw(str(path), text, Room(seed=seed))
         assert shown["findings"] == []
-        if shown["trace"]["moments"][0].get("member") in (None, member, "one"):
+        if shown["episode"]["trace"]["moments"][0].get("member") in (None, member, "one"):
             return session
     raise AssertionError(f"{member} was never drawn")
 

@@ -32,7 +32,9 @@ async def play(address: str, token: str, number: int, all_drawn: asyncio.Barrier
             assert "refused" not in answer
             return answer
 
-        await ask("draw", path=SCENARIO.name, text=SCENARIO.read_text(encoding="utf-8"), seed=number)
+        await ask(
+            "draw", path=SCENARIO.name, text=SCENARIO.read_text(encoding="utf-8"), room={"seed": number}
+        )
         await ask("act", movement="left")
         await all_drawn.wait()
         await asyncio.sleep(
@@ -44,7 +46,7 @@ async def play(address: str, token: str, number: int, all_drawn: asyncio.Barrier
             more = (await ask("act", movement=("left", "right")[k % 2]))["more"]
             took.append(time.perf_counter() - begun)
             if "ended" in more["moments"][-1]:
-                await ask("begin", seed=k)
+                await ask("begin", room={"seed": k})
             await asyncio.sleep(max(0.0, begun + 1 / PER_SECOND - time.perf_counter()))
         return took
 

@@ -65,8 +65,11 @@ def test_a_text_is_a_message_or_is_refused_in_a_sentence(text: str) -> None:
         ('{"id": 1, "do": "back", "to": "0"}', "`to`: got '0'; input should be a valid integer"),
         ('{"id": 1, "do": "back", "to": -1}', "`to`: got -1; input should be greater than or equal to 0"),
         ('{"id": 1, "do": "back", "to": true}', "`to`: got True"),
-        ('{"id": 1, "do": "begin", "seed": 9223372036854775808}', "`seed`: got 9223372036854775808"),
-        ('{"id": 1, "do": "begin", "seed": NaN}', "`seed`: got nan"),
+        (
+            '{"id": 1, "do": "begin", "room": {"seed": 9223372036854775808}}',
+            "`room.seed`: got 9223372036854775808",
+        ),
+        ('{"id": 1, "do": "begin", "room": {"seed": NaN}}', "`room.seed`: got nan"),
         ('{"id": 1, "do": "list", "more": 1}', "the key 'more', which it does not have"),
         ('{"id": null, "do": "list"}', "`id`: got None"),
         ('{"id": 1, "do": "add", "name": "\\ud800.yaml", "text": ""}', "cannot be read: invalid JSON"),
@@ -96,8 +99,8 @@ def test_a_process_answers_every_line_and_goes_on(folder: Path) -> None:
         answer: dict[str, Any] = json.loads(desk.answer(json.dumps({"id": 1, **question})))
         return answer
 
-    drawing = {"do": "draw", "path": SCENARIO.name, "text": SCENARIO.read_text(), "seed": 3}
-    assert "trace" in ask(**drawing)
+    drawing = {"do": "draw", "path": SCENARIO.name, "text": SCENARIO.read_text(), "room": {"seed": 3}}
+    assert "episode" in ask(**drawing)
 
     @settings(max_examples=150, derandomize=True)
     @given(texts(GAME))
@@ -108,7 +111,7 @@ def test_a_process_answers_every_line_and_goes_on(folder: Path) -> None:
         assert not isinstance(found, Refused) or not found.lost, found.refused
 
     each()
-    assert "trace" in ask(**drawing)
+    assert "episode" in ask(**drawing)
     assert ask(do="act", movement="left")["more"]["moments"][0]["t"] == 1
 
 
@@ -138,7 +141,7 @@ def children() -> Iterator[None]:
 @pytest.mark.usefixtures("children")
 def test_a_process_that_answers_wrongly_is_replaced(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "answer_window", answer_wrongly)
-    right = '{"id": 5, "do": "check", "lines": ["x"]}\n'
+    right = '{"id": 5, "do": "check", "claims": [], "findings": [], "lines": ["x"]}\n'
 
     async def ask_all() -> None:
         asked = Engine(folder)

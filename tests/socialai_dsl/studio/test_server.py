@@ -129,8 +129,8 @@ def test_a_window_reads_plays_and_saves(client: Client, tmp_path: Path) -> None:
         assert listed["files"] == ["talkitout.yaml"]
         assert "shipped:talkitout" in listed["runs"], "a trained agent to watch"
         found = window.ask("read", name="talkitout.yaml")
-        drawn = window.ask("draw", path="talkitout.yaml", text=found["text"], seed=3)
-        assert drawn["trace"]["scenario"] == "talkitout"
+        drawn = window.ask("draw", path="talkitout.yaml", text=found["text"], room={"seed": 3})
+        assert drawn["episode"]["trace"]["scenario"] == "talkitout"
         assert window.ask("act", movement="forward")["more"]["moments"][0]["t"] == 1
         window.ask("draft", name="talkitout.yaml", text="typed")
         assert window.ask("read", name="talkitout.yaml")["draft"] == "typed"
@@ -166,27 +166,27 @@ def test_what_takes_too_long_is_stopped_and_says_so(client: Client, monkeypatch:
         assert "was stopped" in stopped["refused"]
         assert stopped["lost"]
         monkeypatch.setattr(engine, "_USUAL_SECONDS", 60)
-        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+        assert "episode" in window.ask("draw", path="talkitout.yaml", text=found["text"])
 
 
 def test_a_process_that_dies_is_replaced_and_harms_no_other(client: Client) -> None:
     with client.window() as opened, client.window() as other:
         window, neighbour = Window(opened), Window(other)
         found = window.ask("read", name="talkitout.yaml")
-        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+        assert "episode" in window.ask("draw", path="talkitout.yaml", text=found["text"])
         deadline = time.monotonic() + 30
         # The one that has loaded everything is on its way out.
         while len(workers()) > 1:
             assert time.monotonic() < deadline
             time.sleep(0.02)
         (own,) = workers()
-        assert "trace" in neighbour.ask("draw", path="talkitout.yaml", text=found["text"])
+        assert "episode" in neighbour.ask("draw", path="talkitout.yaml", text=found["text"])
         os.kill(own, signal.SIGKILL)
         lost = window.ask("act", movement="forward")
         assert lost["lost"]
         assert "has ended" in lost["refused"]
         assert "more" in neighbour.ask("act", movement="forward")
-        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+        assert "episode" in window.ask("draw", path="talkitout.yaml", text=found["text"])
 
 
 def test_whatever_a_window_sends_is_answered_and_its_game_goes_on(
@@ -196,7 +196,7 @@ def test_whatever_a_window_sends_is_answered_and_its_game_goes_on(
     with client.window() as opened:
         window = Window(opened)
         text = window.ask("read", name="talkitout.yaml")["text"]
-        assert "trace" in window.ask("draw", path="talkitout.yaml", text=text)
+        assert "episode" in window.ask("draw", path="talkitout.yaml", text=text)
         harmless = [one for one in GAME if one["do"] not in ("draw", "begin", "act", "auto", "back", "place")]
 
         @settings(
@@ -435,7 +435,7 @@ def test_ctrl_c_ends_it_without_a_word_and_no_module_of_the_folder_was_imported(
     assert found is not None
     with Client(int(found[1])).window(f"session?token={found[2]}") as opened:
         text = (tmp_path / "talkitout.yaml").read_text()
-        assert "trace" in Window(opened).ask("draw", path="talkitout.yaml", text=text)
+        assert "episode" in Window(opened).ask("draw", path="talkitout.yaml", text=text)
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does
         _, told = running.communicate(timeout=30)
     assert (told, running.returncode) == ("", 0)

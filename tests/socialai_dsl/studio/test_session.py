@@ -14,7 +14,9 @@ from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.llm import Episode
+from socialai_dsl.studio.messages import Room, Shown
 from socialai_dsl.studio.session import RefusalError, Session
+from tests.socialai_dsl.studio.shy import SHY
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
@@ -31,19 +33,19 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture
 def session(path: Path) -> Session:
     begun = Session()
-    drawn = begun.draw(str(path), path.read_text(), 3)
+    drawn = begun.draw(str(path), path.read_text(), Room(seed=3))
     assert drawn["findings"] == []
     return begun
 
 
 def test_it_draws_what_is_written_and_not_what_is_saved(path: Path) -> None:
-    drawn = Session().draw(str(path), path.read_text().replace("size: 5..8", "size: 9"), 0)
-    assert drawn["trace"]["moments"][0]["room"] == [9, 9]
+    drawn = Session().draw(str(path), path.read_text().replace("size: 5..8", "size: 9"))
+    assert drawn["episode"]["trace"]["moments"][0]["room"] == [9, 9]
 
 
 def test_mistakes_have_a_place_and_leave_no_room(path: Path) -> None:
     drawn = Session().draw(str(path), path.read_text().replace("horizon:", "horizn:"))
-    assert "trace" not in drawn
+    assert "episode" not in drawn
     assert (drawn["findings"][0]["line"], drawn["findings"][0]["error"]) == (7, True)
     assert "horizon" in drawn["findings"][0]["message"]
 
@@ -53,8 +55,8 @@ def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path
     model = Episode(str(path), "grid")
     for told in (UNTOLD, "Ask."):
         if told == "Ask.":
-            session.draw(str(path), path.read_text() + "instructions: {en: Ask., de: Frag.}\n", 3)
-        seat = session.begin(3)["seat"]
+            session.draw(str(path), path.read_text() + "instructions: {en: Ask., de: Frag.}\n", Room(seed=3))
+        (seat,) = session.begin(Room(seed=3))["episode"]["seats"]
         assert seat["seen"] == model.reset(3)
         assert seat["told"] == f"An episode ends with success, with failure, or after 100 turns. {told}"
         assert seat["compass"]
@@ -93,14 +95,14 @@ def test_steps_are_taken_back_with_their_chance(session: Session) -> None:
         return moments
 
     for seed in range(4):
-        session.begin(seed, "random")
+        session.begin(Room(seed=seed), "random")
         first = play()
         assert session.back(0) == {"length": 0}
         assert play() == first
 
 
 def test_the_script_plays_to_its_end_and_nothing_comes_after_it(session: Session) -> None:
-    session.begin(3, "script")
+    session.begin(Room(seed=3), "script")
     ended = None
     while ended is None:
         ended = session.auto()["more"]["moments"][0].get("ended")
@@ -112,13 +114,13 @@ def test_the_script_plays_to_its_end_and_nothing_comes_after_it(session: Session
 
 
 def test_a_trained_agent_that_ships_plays_to_its_end(session: Session) -> None:
-    session.begin(3, "shipped:talkitout")
+    session.begin(Room(seed=3), "shipped:talkitout")
     ended, moments = None, 0
     while ended is None:
         ended, moments = session.auto()["more"]["moments"][0].get("ended"), moments + 1
     assert moments <= 100
     with pytest.raises(RefusalError, match="no agent of this name ships"):
-        session.begin(3, "shipped:nobody")
+        session.begin(Room(seed=3), "shipped:nobody")
 
 
 def test_it_says_what_was_probably_meant(session: Session) -> None:
@@ -137,8 +139,8 @@ def test_a_thing_is_put_elsewhere_and_the_layout_can_be_used(session: Session) -
         for y in range(1, room["height"] - 1)
         if (x, y) not in taken
     )
-    placed = session.place("wizard", free)
-    assert placed["seed"] == 3, "what happens later is drawn as before"
+    placed = session.place("wizard", free)["episode"]
+    assert placed["room"]["seed"] == 3, "what happens later is drawn as before"
     assert placed["trace"]["moments"][0]["state"]["wizard.at"] == free
     assert placed["trace"]["moments"][0]["state"]["let.exit"] == before["let"]["exit"]
     env = sd.make("talkitout")
@@ -164,9 +166,9 @@ def test_preparing_the_first_step_changes_nothing(path: Path) -> None:
     played = []
     for prepares in (False, True):
         session = Session()
-        session.draw(str(path), path.read_text(), 3)
+        session.draw(str(path), path.read_text(), Room(seed=3))
         for player in ("me", "script", "random"):
-            session.begin(5, player)
+            session.begin(Room(seed=5), player)
             if prepares:
                 session.prepare()
             played.append(
@@ -178,7 +180,7 @@ def test_preparing_the_first_step_changes_nothing(path: Path) -> None:
 def test_a_script_that_does_what_cannot_be_done_is_told_and_the_game_goes_on(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session.begin(3, "script")
+    session.begin(Room(seed=3), "script")
     session.auto()
     with monkeypatch.context() as patched:
         patched.setattr(ScenarioEnv, "scripted_action", lambda self: np.array([-1, 0, 0, 0]))
@@ -196,3 +198,116 @@ def test_files_outside_of_the_folder_are_not_read(tmp_path: Path, base: str) -> 
     (folder / "link.yaml").symlink_to("../secret.yaml")
     drawn = Session().draw(str(folder / "a.yaml"), f"scenario: a\nextends: {base}\n")
     assert "outside the scenario's folder" in drawn["findings"][0]["message"]
+
+
+@pytest.fixture
+def shy(tmp_path: Path) -> tuple[Session, str]:
+    path = tmp_path / "shy.yaml"
+    path.write_text("scenario: shy\n")  # what is checked and played is the text, not the file
+    session = Session()
+    assert "episode" in session.draw(str(path), SHY)
+    return session, str(path)
+
+
+def moments(shown: dict[str, Any]) -> list[dict[str, Any]]:
+    episode = shown["episode"]
+    found: list[dict[str, Any]] = episode["trace"]["moments"]
+    assert len(episode["seats"]) == len(found)
+    return found
+
+
+def test_a_violated_claim_leads_to_its_room_and_its_step(shy: tuple[Session, str]) -> None:
+    session, path = shy
+    checked = session.check(path, SHY)
+    never, reachable, rival, knowable = checked["claims"]
+    assert [one["verdict"] for one in checked["claims"]] == ["fails", "holds", "fails", "holds"]
+    assert (never["file"], never["line"], SHY.splitlines()[never["line"] - 1][:6]) == (None, 24, "check:")
+    assert reachable["shown"] is None
+    assert knowable["shown"] is None
+    assert checked["lines"][0].endswith("shy.yaml: 100 rooms of seed 0")
+
+    shown = Shown.model_validate(never["shown"])
+    assert shown.acts
+    *before, last = moments(session.show(shown))
+    assert last["state"]["guide.state"] == "helped"
+    assert all("helped" not in str(one.get("state")) for one in before)
+
+    # A strategy that lacks the skill plays to the end.
+    *_, last = moments(session.show(Shown.model_validate(rival["shown"])))
+    assert last["ended"]["success"]
+    assert (session._player, session._variant) == ("script", "+hasty")
+    session.begin()
+    assert (session._player, session._variant) == ("me", "")
+
+
+def test_a_failing_test_leads_to_the_step_with_which_something_is_wrong(shy: tuple[Session, str]) -> None:
+    session, path = shy
+    failing, passing = session.test(path, SHY)["tests"]
+    assert (passing["test"], passing["passes"], passing["shown"]) == ("gives_up", True, None)
+    assert not failing["passes"]
+    (finding,) = failing["findings"]
+    assert (finding["code"], finding["file"]) == ("S803", None)
+    assert "heard nothing" in finding["message"]
+    assert failing["shown"]["acts"] == ["forward", "Where is the exit"]
+    last = moments(session.show(Shown.model_validate(failing["shown"])))[-1]
+    assert last["said"] == "Where is the exit"
+    assert "distance(agent) is 3" in str(session._playing()[1].tracer.trace().texts)
+
+
+def test_what_was_played_becomes_a_test_in_the_file_beside(shy: tuple[Session, str], tmp_path: Path) -> None:
+    session, path = shy
+    with pytest.raises(RefusalError, match="nothing was played yet"):
+        session.write_test("told")
+    session.begin(Room(seed=4, index=2))
+    for line in ("forward", "forward Where is the exit"):
+        session.act(line=line)
+    session.act("left")
+    session.back(2)
+    written = session.write_test("told")
+    assert written["beside"] == "shy.tests.yaml"
+    assert not (tmp_path / "shy.tests.yaml").exists()
+    assert written["text"] == f"tests_of: shy.yaml\ntests:\n{written['entry']}"
+    assert "room: {seed: 4, index: 2}" in written["entry"]
+    assert '"Ann: Go to the green door."' in written["entry"]
+    with pytest.raises(RefusalError, match="has a test `told` already; choose another name"):
+        session.write_test("told", written["text"])
+    with pytest.raises(RefusalError, match="expected letters"):
+        session.write_test("a test")
+    both = session.write_test("told_again", written["text"])["text"]
+    Path(path).write_text(SHY)
+    tested = session.test(str(tmp_path / "shy.tests.yaml"), both)["tests"]
+    assert [(one["test"], one["passes"]) for one in tested] == [("told", True), ("told_again", True)]
+
+
+def test_beside_its_tests_a_scenario_is_played(shy: tuple[Session, str], tmp_path: Path) -> None:
+    session, path = shy
+    Path(path).write_text(SHY)
+    beside = tmp_path / "shy.tests.yaml"
+    text = "tests_of: shy.yaml\ntests:\n  waits: {play: [{do: none}], ends: open}\n"
+    drawn = session.draw(str(beside), text)
+    assert drawn["findings"] == []
+    assert len(moments(drawn)) == 1
+    assert "findings" in session.draw(str(beside), text.replace("none", "jump"))
+    session.draw(str(beside), text)
+    session.act("forward")
+    assert "waits" in session.write_test("moves", text)["text"]
+
+
+def test_mistakes_are_found_before_anything_is_played(shy: tuple[Session, str]) -> None:
+    session, path = shy
+    for found in (session.check(path, "scenarioo: x\n"), session.test(path, "tests: {}\nscenarioo: x\n")):
+        assert found["findings"][0]["code"].startswith("S")
+    with pytest.raises(RefusalError, match="there are no tests yet"):
+        session.test(path, SHY[: SHY.index("tests:")])
+
+
+def test_an_episode_begins_again_where_it_began(session: Session) -> None:
+    first = session.begin(Room(seed=5, index=3))["episode"]
+    assert first["room"] == {"seed": 5, "index": 3}
+    env = sd.make("talkitout")
+    env.reset(seed=5, options={"index": 3})
+    assert session.layout()["layout"]["agent"] == env.unwrapped.describe()["agent"]  # type: ignore[attr-defined]
+    test_set = session.begin(Room(test_episode=17))["episode"]["trace"]
+    assert test_set["episode"] == "test episode 17"
+    with pytest.raises(RefusalError, match="leave out the index or the test episode"):
+        session.begin(Room(test_episode=1, index=1))
