@@ -18,7 +18,7 @@ def test_there_is_a_walk_for_an_activity_and_one_for_a_value() -> None:
 @pytest.mark.parametrize("word", WALKS)
 def test_every_file_of_a_walk_speaks_of_what_was_added(word: str) -> None:
     files = re.findall(r"^\| `([\w/.]+)` \|", WALKS[word], flags=re.MULTILINE)
-    assert len(files) == 7
+    assert 5 <= len(files) <= 7
     assert [file for file in files if word not in (ROOT / file).read_text(encoding="utf-8")] == []
 
 

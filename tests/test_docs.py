@@ -20,7 +20,7 @@ from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.scenario import SlotType
-from socialai_dsl.semantics.signatures import SIGNATURES, WORDS
+from socialai_dsl.semantics.words import RESERVED, SIGNATURES
 from socialai_dsl.vocabulary import COLORS, DIRECTIONS, PRIMITIVES
 from tests.tiny import Folder
 
@@ -266,7 +266,7 @@ def test_the_reference_has_every_word() -> None:
     written = set(re.findall(r"[A-Za-z_]\w*", REFERENCE))
     vocabularies = [*PRIMITIVES, *COLORS, *DIRECTIONS, *get_args(SlotType), *shared_grammars()]
     types = [*prelude().types, *(state for type_ in prelude().types.values() for state in type_.states)]
-    assert {*WORDS, *vocabularies, *types} - written == set()
+    assert {*RESERVED, *vocabularies, *types} - written == set()
 
 
 def _constructs() -> set[str]:

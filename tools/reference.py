@@ -208,7 +208,7 @@ _ARGUMENTS: Final = {
 
 
 def _words() -> Iterator[str]:
-    from socialai_dsl.semantics.signatures import SIGNATURES
+    from socialai_dsl.semantics.words import SIGNATURES
 
     yield "## Words\n"
     yield (

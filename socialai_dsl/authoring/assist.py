@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -18,16 +18,9 @@ from socialai_dsl.schema.annotations import annotation_at, holds_expressions, li
 from socialai_dsl.schema.files import ScenarioFile
 from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.dialogues import ENDS
-from socialai_dsl.semantics.signatures import (
-    ACTIVITIES,
-    EFFECTS,
-    PLACES,
-    QUANTIFIERS,
-    SIGNATURES,
-    VALUES,
-    Signature,
-)
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.typed import STANDING
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, SIGNATURES, VALUES
 from socialai_dsl.source import Data, DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES
 
@@ -116,7 +109,8 @@ def _declares(cursor: Cursor) -> Iterator[Name]:
 def _signatures(cursor: Cursor) -> Iterable[Signature]:
     """The instructions that a word may be, those that fit its place first."""
     key = last_key(cursor.path)
-    table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
+    tables: Mapping[object, Mapping[str, Signature]] = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}
+    table = tables.get(key, VALUES)
     return (
         ()
         if cursor.is_key or _is_prose(cursor.path) or (_is_text(cursor.path) and "<" not in cursor.before)
@@ -258,7 +252,7 @@ def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
 
 def _in_expression(cursor: Cursor, data: Data, key: str, root: type[BaseModel] | None) -> Iterator[Offer]:
     if cursor.before.endswith("."):
-        table = EFFECTS if key == "cause" else VALUES
+        table: Mapping[str, Signature] = EFFECTS if key == "cause" else VALUES
         subject = cursor.before.removesuffix(".").split(" ")[-1].lstrip("(!<")
         yield from _verbs(table.values(), _kinds_of(subject, data))
         return
@@ -271,7 +265,7 @@ def _in_expression(cursor: Cursor, data: Data, key: str, root: type[BaseModel] |
         return
     if cursor.before.endswith("is("):
         return
-    tables: list[dict[str, Signature]] = []
+    tables: list[Mapping[str, Signature]] = []
     tables += [ACTIVITIES] if key == "do" and "(" not in cursor.before else []
     tables += [PLACES] if key in ("place", "build") else []
     tables += [VALUES] if takes_values or "(" in cursor.before or "<" in cursor.before else []

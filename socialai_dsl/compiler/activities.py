@@ -18,33 +18,21 @@ from socialai_dsl.semantics.terms import (
     SitedTerm,
     Term,
 )
-
-_TO_A_PLACE = ("go_to", "go_next_to", "enter")
-GOING = (*_TO_A_PLACE, "search")
-"""Activities that take no step when they are fulfilled before they begin."""
-
+from socialai_dsl.semantics.words import ACTIVITIES
+from socialai_dsl.vocabulary import PRIMITIVES
 
 NOTHING = -1
 """In the register of an aim: the activity found nothing to be about."""
-_ACT_OF = {
-    "use": Body.TOGGLE,
-    "push": Body.FORWARD,
-    "fetch": Body.PICKUP,
-    "give": Body.DROP,
-    "bring": Body.DROP,
-}
-ACTS = tuple(_ACT_OF)
-"""Activities that end with the act itself, which may move or replace what it is done to."""
-OF_HANDS = ("fetch", "give", "bring")
 GETTING_THERE, ACTING, FULFILLED = 0, 1, 2
 """In the register of the aim of such an activity: what this turn was for; nothing, as all was done before it."""
 
 
 def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
-    if activity.name in ACTS:
+    word = ACTIVITIES[activity.name]
+    if word.act is not None:
         return True
-    return activity.name in (*_TO_A_PLACE, "turn_to") and not isinstance(activity.args[0], Const)
+    return (word.goes is not None or activity.name == "turn_to") and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -94,10 +82,10 @@ class Activities:
     def _note_aim(self, activity: Activity) -> None:
         to, block = self.to, self.to.block
         own, done = constant(self.entity), Label()
-        if activity.name not in ACTS:
+        if ACTIVITIES[activity.name].act is None:
             self._aimed_at(activity)
             return
-        if activity.name in OF_HANDS:
+        if ACTIVITIES[activity.name].of_hands:
             self._use_hands(activity, acting=False)
             return
         self._note(GETTING_THERE)
@@ -118,7 +106,7 @@ class Activities:
         match activity.name:
             case "stay":
                 block.emit(Op.BODY, constant(Body.NONE))
-            case "left" | "right" | "forward" | "toggle" | "pickup" | "drop":
+            case name if name in PRIMITIVES:
                 block.emit(Op.BODY, constant(Body[activity.name.upper()]))
             case "face":
                 self._face(to.value(activity.args[0]))
@@ -389,8 +377,8 @@ class Activities:
 
         If its argument finds nothing, on to `nothing`.
         """
-        to, block = self.to, self.to.block
-        if activity.name not in (*GOING, *ACTS, "turn_to", "perform"):
+        to, block, word = self.to, self.to.block, ACTIVITIES[activity.name]
+        if not (word.lapses or word.act or activity.name in ("turn_to", "perform")):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
@@ -398,22 +386,22 @@ class Activities:
             to.failed = nothing
             if activity.name == "perform":
                 block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
-            elif activity.name in ACTS:
+            elif word.act is not None:
                 assert self.aim is not None, "internal: the end of an act asks what was noted"
                 block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
                 ended = Label()
-                if activity.name in OF_HANDS:
+                if word.of_hands:
                     block.unless(Op.IF_EQ, self.aim, constant(FULFILLED), ended)
                 block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
                 # A scripted agent's frame follows what the agent has really done.
-                act = constant(_ACT_OF[activity.name])
+                act = constant(Body[word.act.upper()])
                 block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), act, otherwise)
                 if activity.name == "fetch":
                     empty = Label()
                     self._while_empty_handed(empty)
                     block.skip(otherwise)
                     block.bind(empty)
-                elif activity.name in OF_HANDS:
+                elif word.of_hands:
                     self._while_empty_handed(otherwise)
                 block.bind(ended)
             elif activity.name == "search":
@@ -422,7 +410,7 @@ class Activities:
                 facing = entity_register(self.entity, Field.DIR)
                 block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)
             else:
-                op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
+                op = Op.IF_NEXT_TO if word.goes == "beside" else Op.IF_SAME_CELL
                 block.test(op, own, self._goal(activity, nothing), otherwise)
             to.failed = None
 

@@ -37,6 +37,7 @@ from socialai_dsl.semantics.plans import (
     StepPlan,
 )
 from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, SitedTerm, Term, Type, numbers_of
+from socialai_dsl.semantics.words import EFFECTS
 
 # -- what the effect `reset` puts back -----------------------------------------------------------------------
 
@@ -153,9 +154,6 @@ def _save_cell(block: Block, number: int, register: int) -> None:
 
 
 # -- effects: all values are computed before anything changes ------------------------------------------------
-
-
-_TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 
 
 V = TypeVar("V")
@@ -299,11 +297,13 @@ class Effects:
         block = self.to.block
         kind = _type(self.checked.entities[numbers_of(term)[0]])
         states = kind.states
-        if effect.name != "unlock":
-            block.emit(Op.BECOME, entity, constant(states.index(_TARGETS[effect.name])))
+        word = EFFECTS[effect.name]
+        if word.makes is not None:
+            block.emit(Op.BECOME, entity, constant(states.index(word.makes)))
             return
+        assert word.needs is not None, "internal: an effect that leads to a status, or needs one"
         status = self.to.into_temporary(Op.FIELD, entity, Field.STATUS)
-        with block.when(Op.IF_EQ, status, constant(states.index("locked"))):
+        with block.when(Op.IF_EQ, status, constant(states.index(word.needs))):
             block.emit(Op.BECOME, entity, constant(kind.unlocked))
 
     def _reset(self, term: Term, entity: int) -> None:

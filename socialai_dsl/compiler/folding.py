@@ -13,7 +13,6 @@ from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity
 from socialai_dsl.semantics.resolver import texts_of
-from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import (
     BOOL,
     Const,
@@ -26,6 +25,7 @@ from socialai_dsl.semantics.terms import (
     may_find_nothing,
     numbers_of,
 )
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS
 from socialai_dsl.vocabulary import normal
 
 SILENCE = 0
@@ -533,7 +533,7 @@ class Mobility:
         self.vanishing |= self.carried
 
     def _act(self, number: int, activity: Activity) -> None:
-        self.pointing |= activity.name == "point"
+        self.pointing |= ACTIVITIES[activity.name].arm == "points"
         moves = ACTIVITIES[activity.name].moves
         if moves != "stays":
             self.turning.add(number)
@@ -542,9 +542,9 @@ class Mobility:
 
     def _cause(self, effect: Effect) -> None:
         targets = {number for target in effect.entities for number in numbers_of(target)}
-        if effect.name in ("vanish", "move_into", "put"):
+        if EFFECTS[effect.name].takes_away:
             self.vanishing |= targets
-        if effect.name in ("move_into", "put"):
+        if EFFECTS[effect.name].carries_off:
             self.walking |= targets
         if effect.name == "move_into":
             self.contents |= targets

@@ -9,11 +9,8 @@ from itertools import product
 
 from socialai_dsl.compiler.activities import (
     ACTING,
-    ACTS,
     FULFILLED,
-    GOING,
     NOTHING,
-    OF_HANDS,
     Activities,
     has_aim,
 )
@@ -55,6 +52,7 @@ from socialai_dsl.semantics.plans import (
     StepPlan,
 )
 from socialai_dsl.semantics.terms import BOOL, Pattern, Type
+from socialai_dsl.semantics.words import ACTIVITIES
 
 
 class RuleConditions:
@@ -236,8 +234,9 @@ class _FrameCompiler:
         self.later = DeferredRules(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: plans.Activity) -> Type:
-        if activity.name in ACTS:
-            return Type("int", NOTHING, FULFILLED if activity.name in OF_HANDS else ACTING)
+        word = ACTIVITIES[activity.name]
+        if word.act is not None:
+            return Type("int", NOTHING, FULFILLED if word.of_hands else ACTING)
         return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
     def rows(self) -> list[list[int]]:
@@ -541,7 +540,7 @@ class _FrameCompiler:
     @staticmethod
     def _skippable(step: StepPlan) -> bool:
         has_effects = step.sets or step.causes or step.say is not None
-        return step.activity.name in GOING and not has_effects and step.ends_with_its_activity
+        return ACTIVITIES[step.activity.name].lapses and not has_effects and step.ends_with_its_activity
 
     def _end_step(self, to: Expressions, k: int) -> None:
         """The entry's effects and the next entry, once it has ended."""

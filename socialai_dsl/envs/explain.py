@@ -36,6 +36,7 @@ from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.scenario import Model
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Const, Read, Readings, Term
+from socialai_dsl.semantics.words import ACTIVITIES
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import spelt
 
@@ -156,8 +157,6 @@ def _listed(names: Sequence[str]) -> str:
 # -- rules and their reasons ---------------------------------------------------------------------------------
 
 
-_TO_IT: Final = ("go_to", "enter")
-_BESIDE_IT: Final = ("go_next_to", "use")
 _ORDER: Final = ("hears", "until", "for", "when", "after", "chance", "once", "success", "failure", "do", "set",
                  "reward", "cause", "say", "goto", "goto_now")  # fmt: skip
 """In which order the keys of a rule are shown."""
@@ -274,7 +273,7 @@ class _Notes:
 
     def _hindered(self, plan: RulePlan | StepPlan | OutcomePlan) -> str | None:
         """What keeps a member from getting where an entry of `steps` lets it go."""
-        if not isinstance(plan, StepPlan) or plan.activity.name not in (*_TO_IT, *_BESIDE_IT):
+        if not isinstance(plan, StepPlan) or (goes := ACTIVITIES[plan.activity.name].goes) is None:
             return None
         member, number = plan.name.partition(".")[0], plan.name.rpartition("[")[2].rstrip("]")
         goal = self._goal(plan.activity.args[0], f"{member}.aim[{number}]")
@@ -282,7 +281,7 @@ class _Notes:
         if goal is None or goal < 0:
             return None
         moment = RoomState(self.program, self.registers, self.board)
-        return moment.obstruction(mover, goal, plan.activity.name in _BESIDE_IT)
+        return moment.obstruction(mover, goal, beside=goes == "beside")
 
     def _goal(self, term: Term, noted: str) -> int | None:
         """The entity or cell that an activity is about, if a register or the scenario says it."""

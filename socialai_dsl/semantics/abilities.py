@@ -9,17 +9,15 @@ from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Activity
 from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Scope, quoted
-from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import Const, Term
+from socialai_dsl.semantics.words.activities import Deed
 from socialai_dsl.vocabulary import PRIMITIVES
 
 
-def check_actions(
-    resolver: Resolver, found: Activity, signature: Signature, node: ast.Expr, scope: Scope
-) -> None:
+def check_actions(resolver: Resolver, found: Activity, word: Deed, node: ast.Expr, scope: Scope) -> None:
     """The agent has only the actions that the scenario gives it, so a frame that it follows has no others."""
     scenario = resolver.symbols.scenario
-    lacking = [action for action in _actions_of(found, signature, resolver) if action not in scenario.actions]
+    lacking = [action for action in _actions_of(found, word, resolver) if action not in scenario.actions]
     if lacking:
         listed = " and ".join(f"`{action}`" for action in lacking)
         message = f"`{quoted(node)}` needs {listed}, which the agent cannot do"
@@ -27,7 +25,7 @@ def check_actions(
         raise resolver.fail("S320", message, node, scope, hint=hint)
 
 
-def _actions_of(found: Activity, signature: Signature, resolver: Resolver) -> Iterator[str]:
+def _actions_of(found: Activity, word: Deed, resolver: Resolver) -> Iterator[str]:
     """The body actions that an activity of the agent may take."""
     match found.name:
         case "choose" | "turn":
@@ -43,7 +41,7 @@ def _actions_of(found: Activity, signature: Signature, resolver: Resolver) -> It
         case "enter" if not _shuts(resolver, found.args[0]):
             yield from ("forward", "left", "right")
         case _:
-            yield from signature.actions
+            yield from word.actions
 
 
 def _shuts(resolver: Resolver, what: Term) -> bool:

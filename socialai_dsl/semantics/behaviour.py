@@ -9,9 +9,8 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import abilities, addressing, groups, hands, object_facts, rows, texts, those
+from socialai_dsl.semantics import abilities, addressing, groups, rows, texts, those
 from socialai_dsl.semantics.entities import AGENT
-from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.nesting import NestedPlanner
 from socialai_dsl.semantics.plans import (
     FOR_EVER,
@@ -23,7 +22,7 @@ from socialai_dsl.semantics.plans import (
     StatePlan,
     StepPlan,
 )
-from socialai_dsl.semantics.resolve_names import single, status_of
+from socialai_dsl.semantics.resolve_names import single
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
     KEY,
@@ -38,22 +37,14 @@ from socialai_dsl.semantics.scope import (
     reset_scope,
     step_scope,
     surviving,
-    with_article,
     wrong_count,
 )
-from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
 from socialai_dsl.semantics.terms import (
-    ACTION,
     BOOL,
     CELL,
-    DIRECTION,
-    TURN,
-    CellOf,
     Compare,
     Const,
-    FieldOf,
     Line,
-    Measure,
     Read,
     ReadEach,
     SitedTerm,
@@ -64,18 +55,11 @@ from socialai_dsl.semantics.terms import (
     entity,
 )
 from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, on_hearing, with_slots
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, SYNONYMS
+from socialai_dsl.semantics.words.activities import Doing
+from socialai_dsl.semantics.words.effects import Caused
 from socialai_dsl.source import DataPath
 from socialai_dsl.widths import LARGEST_NUMBER
-
-_STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
-"""The status that an object must be able to have for an effect to make sense."""
-
-_TYPES = {"entity": ENTITY, "direction": DIRECTION, "turn": TURN, "int": INT}
-"""What is expected of an argument, by what the signature takes."""
-_TO_CELLS = frozenset({"go_to", "go_next_to", "face", "bring"})
-"""Activities for which a cell will do."""
-
-_WANDERING = ("forward", "left", "right")
 
 
 def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) -> Activity:
@@ -86,73 +70,18 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         return Activity("stay", (), site, span)
     node = resolver.findings.expression(path, raw)
     name, args = _head(resolver, node, scope)
-    signature = ACTIVITIES.get(name)
-    if signature is None:
+    word = ACTIVITIES.get(name)
+    if word is None:
         raise _unknown(resolver, name, args, node, scope)
-    if len(args) != len(signature.takes):
-        raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
-    _check_mover(resolver, name, node, scope)
-    found = _activity(resolver, path, node, name, args, scope)
-    if scope.member == AGENT and not (scope.frame is not None and scope.frame.looked_at):
-        abilities.check_actions(resolver, found, signature, node, scope)
-    return found
-
-
-def _activity(
-    resolver: Resolver, path: DataPath, node: ast.Expr, name: str, args: tuple[ast.Expr, ...], scope: Scope
-) -> Activity:
-    """The activity of a signature, with its arguments."""
-    span, site, signature = resolver.findings.at(path), scope.draws.site, ACTIVITIES[name]
-    if name == "wander":
-        actions = tuple(Const(ACTION, ACTION.words.index(word)) for word in _WANDERING)
-        return Activity("choose", actions, site, span, (1, 1, 1), scope.draws.number())
-    if name == "choose":
-        return _choice(resolver, path, args[0], scope)
-    if name == "perform":
-        return Activity("perform", performed(resolver, args[0], scope), site, span)
-    if name in ("fetch", "give", "bring"):
-        terms = tuple(_argument(resolver, name, arg, ENTITY, scope) for arg in args)
-        hands.check_arguments(resolver, name, terms, args, scope)
-        return Activity(name, terms, site, span)
-    if name == "search":
-        assert isinstance(node, ast.Call), "internal: it has an argument"
-        return Activity(name, (resolver.value(replace(node, name="sees"), BOOL, scope),), site, span)
-    if name in ("push", "point", "point_at", "follow"):
-        return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
-    terms = tuple(
-        _argument(resolver, name, arg, _TYPES[takes], scope)
-        for takes, arg in zip(signature.takes, args, strict=True)
-    )
-    return Activity(name, terms, site, span)
-
-
-def _check_mover(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> None:
-    """The agent has no arm to point with, so a frame that it follows cannot either."""
-    looked_at = scope.frame is not None and scope.frame.looked_at
-    if name in ("point", "point_at", "stop_pointing") and scope.member == AGENT and not looked_at:
+    if len(args) != len(word.takes):
+        raise resolver.fail("S211", wrong_count(word, len(args)), node, scope)
+    own = scope.member == AGENT and not (scope.frame is not None and scope.frame.looked_at)
+    if word.arm is not None and own:
         raise resolver.fail("S204", "the agent cannot point; only NPCs do", node, scope)
-
-
-def _at_something(
-    resolver: Resolver, name: str, args: tuple[ast.Expr, ...], written: Activity, scope: Scope
-) -> Activity:
-    """What a few activities are about, such as of point(x) the direction in which x lies, of point_at(x) its cell."""
-    if name == "follow":
-        return replace(written, name="go_next_to", args=(_argument(resolver, name, args[0], ENTITY, scope),))
-    if name == "point":
-        assert scope.member is not None, "internal: an activity is somebody's"
-        there = entity(resolver.symbols.numbers[scope.member]), resolver.somewhere(args[0], scope)
-        return replace(written, name="point", args=(Measure(DIRECTION, "dir_to", there),))
-    if name == "point_at":
-        return replace(written, name="point", args=(CellOf(CELL, resolver.somewhere(args[0], scope)),))
-    what = _argument(resolver, name, args[0], ENTITY, scope)
-    for number in what.type.values:
-        objects = resolver.symbols.object_of(number)
-        if objects is None or not objects.type.pushed:
-            message = f"`{quoted(args[0])}` cannot be pushed"
-            able = [key for key, type_ in resolver.symbols.types.items() if type_.pushed]
-            raise resolver.fail("S204", message, args[0], scope, hint="what can be: " + ", ".join(able))
-    return replace(written, name="push", args=(what, resolver.value(args[1], DIRECTION, scope)))
+    found = word.meaning(Doing(resolver, word, node, args, path, scope))
+    if own:
+        abilities.check_actions(resolver, found, word, node, scope)
+    return found
 
 
 def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[ast.Expr, ...]]:
@@ -176,58 +105,11 @@ def _unknown(
     given = f"({', '.join(map(quoted, args))})" if args else ""
     synonym = SYNONYMS.get(name)
     if synonym:
-        takes = ACTIVITIES[synonym].takes
-        usage = synonym + (given or "(x)" if takes else "")
+        usage = synonym + (given or "(x)" if ACTIVITIES[synonym].takes else "")
         purpose = {"use": "to toggle something ", "enter": "to go through something "}.get(synonym, "")
         return resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
     advice = advice_on(name, ACTIVITIES, "activities are " + ", ".join(ACTIVITIES))
     return resolver.fail("S205", f"unknown activity `{name}`", node, scope, **advice)
-
-
-def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
-    if expected is ENTITY and groups.is_group(resolver, node, scope):
-        group = quoted(node)
-        more = ", ..." if len(ACTIVITIES[name].takes) > 1 else ""
-        hint = f"`{name}(nearest(d in {group} to self){more})`, or draw one in `let` with `pick({group})`"
-        raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
-    if name in _TO_CELLS:
-        return resolver.somewhere(node, scope)
-    term = resolver.value(node, expected, scope)
-    if name == "enter":
-        _check_entrance(resolver, term, node, scope)
-    return term
-
-
-def _check_entrance(resolver: Resolver, term: Term, node: ast.Expr, scope: Scope) -> None:
-    """Only objects of one type that can be walked on can be entered."""
-    if term.type.low < len(resolver.symbols.numbers):
-        raise resolver.fail(
-            "S204", f"`{quoted(node)}` is no object; only objects can be entered", node, scope
-        )
-    status_of(resolver, term, node, scope)
-    objects = resolver.symbols.object_of(term.type.low)
-    assert objects is not None, "internal: what has a status is an object"
-    if not objects.type.walkable:
-        raise resolver.fail("S204", f"{with_article(objects.type.name)} can never be entered", node, scope)
-
-
-def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) -> Activity:
-    ordinal = scope.draws.number()
-    members = groups.group(resolver, _with_stay(node), ACTION, scope)
-    if members.type != ACTION:
-        raise resolver.fail(
-            "S204", f"`{quoted(node)}` are not actions; write choose(forward | left)", node, scope
-        )
-    weights = {item: members.items.count(item) for item in members.items}
-    span = resolver.findings.at(path)
-    return Activity("choose", tuple(weights), scope.draws.site, span, tuple(weights.values()), ordinal)
-
-
-def _with_stay(node: ast.Expr) -> ast.Expr:
-    """`stay` among the options is the action `none`: the word that stands alone in a `do:` may stand here too."""
-    if isinstance(node, ast.Alternatives):
-        return replace(node, options=tuple(map(_with_stay, node.options)))
-    return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
 
 
 def effects(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Iterator[Effect]:
@@ -246,42 +128,24 @@ def effects(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> It
             raise resolver.fail(
                 "S205", message, node, scope, hint="effects are x.open, x.close, x.vanish, ..."
             )
-    signature = EFFECTS.get(name)
-    if signature is None:
+    word = EFFECTS.get(name)
+    if word is None:
         advice = advice_on(name, EFFECTS, "effects are " + ", ".join(EFFECTS))
         raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, **advice)
-    if len(args) != len(signature.takes):
-        raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
+    if len(args) != len(word.takes):
+        raise resolver.fail("S211", wrong_count(word, len(args)), node, scope)
+
+    def effect(entities: tuple[Term, ...], scope: Scope) -> Effect:
+        value = word.meaning(Caused(resolver, word, node, subject, entities, args, scope))
+        return Effect(cast(Any, name), entities, resolver.findings.at(path), value, scope.draws.site)
+
     if (which := those.found(subject)) is None:
-        yield _effect(resolver, path, node, _entities(resolver, subject, scope), args, scope)
+        yield effect(_entities(resolver, subject, scope), scope)
         return
     for chosen, inner, each in those.affected(resolver, which, args, scope):
         entities = _things([one.item for one in chosen], which.group, resolver, scope)
         only = tuple(one.condition for one in chosen)
-        yield replace(_effect(resolver, path, node, entities, args, inner), only=only, each=each)
-
-
-def _effect(
-    resolver: Resolver,
-    path: DataPath,
-    node: ast.Attribute | ast.Call,
-    entities: tuple[Term, ...],
-    args: tuple[ast.Expr, ...],
-    scope: Scope,
-) -> Effect:
-    """The effect that a node names, on these entities."""
-    name, subject, signature = node.name, node.subject, EFFECTS[node.name]
-    assert subject is not None, "internal: an effect on nothing"
-    if name == "vanish" and any(entity.type.low == 0 for entity in entities):
-        raise resolver.fail("S204", _not_the_agent(subject, entities, "vanish"), node, scope)
-    value = None
-    if name in ("put", "move_into"):
-        value = _target(resolver, name, subject, entities, args[0], scope)
-    elif name == "reset":
-        _check_objects(resolver, subject, entities, scope)
-    elif signature.subject == "object":
-        value = _new_status(resolver, name, entities, args, node, scope)
-    return Effect(cast(Any, name), entities, resolver.findings.at(path), value, scope.draws.site)
+        yield replace(effect(entities, inner), only=only, each=each)
 
 
 def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
@@ -304,58 +168,6 @@ def _things(
         message = f"`{quoted(node)}` is {described(type_)}, but {described(ENTITY)} is expected here"
         raise resolver.fail("S204", message, node, scope)
     return tuple(items)
-
-
-def _target(
-    resolver: Resolver, name: str, subject: ast.Expr, entities: tuple[Term, ...], node: ast.Expr, scope: Scope
-) -> Term:
-    """Where something is put: a cell or what is on it; an object that can hold it."""
-    if name == "put" and isinstance(node, ast.Name) and node.id == "nowhere":
-        message = f"what is taken out of the room vanishes: `{quoted(subject)}.vanish`"
-        raise resolver.fail("S204", message, node, scope)
-    if name == "put":
-        return resolver.somewhere(node, scope)
-    holder = resolver.value(node, ENTITY, scope)
-    things = [number for one in entities for number in one.type.values]
-    object_facts.check_holder(resolver, holder, node, scope, things)
-    for thing in () if hands.is_member(resolver, holder) else entities:
-        object_facts.container(resolver, thing, subject, scope)
-    return holder
-
-
-def _check_objects(resolver: Resolver, node: ast.Expr, entities: tuple[Term, ...], scope: Scope) -> None:
-    """The agent cannot be put back to where it started."""
-    if any(entity.type.low == 0 for entity in entities):
-        raise resolver.fail("S211", _not_the_agent(node, entities, "be reset"), node, scope)
-
-
-def _not_the_agent(node: ast.Expr, entities: tuple[Term, ...], what: str) -> str:
-    if all(isinstance(entity, Const) for entity in entities):
-        return f"the agent cannot {what}"
-    return f"`{quoted(node)}` may be the agent, which cannot {what}"
-
-
-def _new_status(
-    resolver: Resolver,
-    name: str,
-    entities: tuple[Term, ...],
-    args: tuple[ast.Expr, ...],
-    node: ast.Expr,
-    scope: Scope,
-) -> Term | None:
-    """The status that `become` gives; for the others, only whether the object can have what they make of it."""
-    fields: list[FieldOf] = [status_of(resolver, entity, node, scope) for entity in entities]
-    type_ = fields[0].type
-    if name == "become":
-        return resolver.value(args[0], type_, scope)
-    status = _STATUS_AFTER.get(name)
-    if status is not None and status not in type_.words:
-        assert isinstance(node, ast.Attribute | ast.Call), "internal: an effect on nothing"
-        message = (
-            f"`{name}` cannot happen to `{quoted(node.subject or node)}`: it is {' or '.join(type_.words)}"
-        )
-        raise resolver.fail("S204", message, node, scope, hint="`x.become(status)` sets a status")
-    return None
 
 
 # -- frames --------------------------------------------------------------------------------------------------

@@ -42,7 +42,6 @@ from socialai_dsl.semantics.scope import (
     surviving,
     with_article,
 )
-from socialai_dsl.semantics.signatures import WORDS
 from socialai_dsl.semantics.terms import (
     CELL,
     COLOR,
@@ -56,6 +55,7 @@ from socialai_dsl.semantics.terms import (
     Type,
 )
 from socialai_dsl.semantics.terms import number as number_of
+from socialai_dsl.semantics.words import RESERVED
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import is_plain
 
@@ -201,7 +201,7 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
     taken: dict[str, str] = {}
     for kind, path, name in _names(scenario):
         span = findings.places.key_span(path)
-        if (name in WORDS and name != AGENT) or (name in _ATTRIBUTES and path[0] in ("state", "looks")):
+        if (name in RESERVED and name != AGENT) or (name in _ATTRIBUTES and path[0] in ("state", "looks")):
             message = f"`{name}` is a word of the language; call the {kind} something else"
             findings.error("S213", message, span)
         elif name in _OF_LAYOUTS and path[0] in ("objects", "cast"):
@@ -232,7 +232,7 @@ def _check_frame_names(path: DataPath, frame: Frame, shared: Mapping[str, str], 
             name = (parse_define(key) or (key, ()))[0]
             part = {"slot": "slots", "register": "let", "definition": "define"}[kind]
             span = findings.places.key_span((*path, part, key))
-            if name in WORDS or name in _TAKEN:
+            if name in RESERVED or name in _TAKEN:
                 findings.error(
                     "S213", f"`{name}` is a word of the language; call the {kind} something else", span
                 )

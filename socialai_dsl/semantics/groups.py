@@ -24,7 +24,7 @@ from socialai_dsl.semantics.scope import (
     surviving,
     usage,
 )
-from socialai_dsl.semantics.signatures import QUANTIFIERS, WORDS, Signature
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -254,14 +254,16 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
 
 def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> None:
     """Report a quantifier that is not known, or lacks a part."""
-    if node.name not in QUANTIFIERS:
+    if node.name not in resolver.words.quantifiers:
         message = f"`{node.name}({node.var} in ...)` is not known"
-        if node.name in WORDS and node.where is None and node.to is None:
+        if node.name in resolver.words.reserved and node.where is None and node.to is None:
             condition = f"`{node.name}(({node.var} in {quoted(node.group)}))`"
             hint = f"a comparison with `in` takes brackets of its own: {condition}"
             raise resolver.fail("S205", message, node, scope, hint=hint)
-        raise resolver.fail("S205", message, node, scope, suggestion=did_you_mean(node.name, QUANTIFIERS))
-    if node.var in WORDS or node.var in resolver.symbols.declared:
+        raise resolver.fail(
+            "S205", message, node, scope, suggestion=did_you_mean(node.name, resolver.words.quantifiers)
+        )
+    if node.var in resolver.words.reserved or node.var in resolver.symbols.declared:
         message = f"the variable `{node.var}` has a name that means something already"
         raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
     if node.name == "nearest" and node.to is None:
@@ -325,23 +327,12 @@ def named(word: str, scope: Scope) -> str:
 # -- subjects: what may stand before the dot, and when it may be asked ---------------------------------------
 
 
-OF_CELLS = frozenset({"in_line", "unobstructed", "distance", "dir_to", "x", "y"})
-"""What a cell that is no candidate for a placement can be asked as well."""
-
-
 def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
     """Report what cannot point: an object, and the agent, which has no arm to do it with."""
     if who.type.high >= len(resolver.symbols.numbers):
         raise resolver.fail("S204", f"only NPCs point, so only they have `{name}`", node, scope)
     if who.type.high == 0:
         raise resolver.fail("S204", "the agent never points; only NPCs do", node, scope)
-
-
-def check_toggled(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
-    """Report memories that are never used."""
-    if who.type.low < len(resolver.symbols.numbers):
-        message = f"only objects are toggled, so only they have `{name}`"
-        raise resolver.fail("S204", message, node, scope, hint="an NPC is poked: `anna.poked`")
 
 
 def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
@@ -372,9 +363,9 @@ def subject_of(
             raise resolver.fail(
                 "S201", "`here` is the candidate cell; it means something only in a place", subject, scope
             )
-        if signature.name in OF_CELLS and not signature.cell:
+        if signature.cell and not signature.candidate:
             return Here(CELL, "cell")
-        if not signature.cell:
+        if not signature.candidate:
             raise resolver.fail("S211", f"a cell cannot be asked for `{signature.name}`", node, scope)
         return None
     if is_group(resolver, subject, scope):
@@ -384,7 +375,7 @@ def subject_of(
         hint = f"`any({letter} in {group} where {asked} ...)`, or `all`, `first`, `pick`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", subject, scope, hint=hint)
     who = resolver.value(subject, None, scope)
-    if who.type.kind == "cell" and (signature.cell or signature.name in OF_CELLS):
+    if who.type.kind == "cell" and (signature.candidate or signature.cell):
         return who
     return resolver.fit(who, ENTITY, subject, scope)
 

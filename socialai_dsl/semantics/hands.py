@@ -42,10 +42,9 @@ def is_member(resolver: Resolver, term: Term) -> bool:
     return term.type.kind == "entity" and term.type.high < len(resolver.symbols.numbers)
 
 
-def carries(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
+def carries(resolver: Resolver, who: Term, what: ast.Expr, node: ast.Expr, scope: Scope) -> Term:
     """`ann.carries(x)`; of a group, any of it."""
     _check_hands(resolver, who, node, scope)
-    (what,) = node.args
     if groups.is_group(resolver, what, scope):
         return groups.any_member(resolver, what, scope, lambda one: _in_hands(resolver, who, one))
     thing = resolver.value(what, ENTITY, scope)

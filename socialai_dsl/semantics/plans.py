@@ -26,6 +26,12 @@ FOR_EVER: Final = -1
 # --- places -----------------------------------------------------------------------------------------------------
 
 
+RegionName = Literal[
+    "anywhere", "left_half", "right_half", "top_half", "bottom_half", "column", "row", "rect", "next_to",
+    "in_front_of", "wall",
+]  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True)
 class Region:
     """A set of cells.
@@ -34,19 +40,7 @@ class Region:
     next_to(entity), in_front_of(entity); wall (side in `side`, cells at least `margin` from its corners).
     """
 
-    name: Literal[
-        "anywhere",
-        "left_half",
-        "right_half",
-        "top_half",
-        "bottom_half",
-        "column",
-        "row",
-        "rect",
-        "next_to",
-        "in_front_of",
-        "wall",
-    ]
+    name: RegionName
     args: tuple[Term, ...] = ()
     side: Side | None = None
     margin: int = 1

@@ -30,6 +30,7 @@ from socialai_dsl.semantics.terms import (
     may_find_nothing,
     walk,
 )
+from socialai_dsl.semantics.words import EFFECTS
 from socialai_dsl.source import DataPath, Span
 from socialai_dsl.vocabulary import Sentences, first_alike, normal
 
@@ -402,10 +403,6 @@ def _conjuncts(term: Term) -> tuple[Term, ...]:
 # -- conditions that no value makes true ---------------------------------------------------------------------
 
 
-_GIVES: Final = {"open": ("open", "opened"), "close": ("closed", "shut"), "lock": ("locked",)}
-"""Statuses that an effect may lead to, of those that a type has."""
-
-
 def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     """Report conditions that can never hold: of rules (W311), of steps, outcomes and probes (W314), and S316 where
     nothing is left to be played: no success, or no room.
@@ -698,13 +695,13 @@ class _Statuses:
 
     def _given(self, effect: Effect, type_: ObjectType) -> set[int] | None:
         """Statuses that an effect leads to; None for any."""
-        match effect.name:
-            case "vanish" | "put" | "move_into" | "reset":
-                return set()
-            case "open" | "close" | "lock":
-                return {type_.states.index(name) for name in _GIVES[effect.name] if name in type_.states}
-            case "unlock":
-                return {type_.unlocked}
-            case "become" if isinstance(effect.value, Const):
-                return {effect.value.value}
+        word = EFFECTS[effect.name]
+        if word.makes is not None:
+            return {type_.states.index(word.makes)}
+        if word.needs is not None:
+            return {type_.unlocked}
+        if not word.sets_status:
+            return set()
+        if isinstance(effect.value, Const):
+            return {effect.value.value}
         return None

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, cast, get_args
+from typing import Any
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import groups, hands, object_facts, resolve_names, rows, tables, texts
+from socialai_dsl.semantics import groups, object_facts, resolve_names, rows, tables
 from socialai_dsl.semantics.conditional import conditional
-from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
-from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
-from socialai_dsl.semantics.resolver import ENTITY, INT, WORDED, Resolver, same_kind, text_value
+from socialai_dsl.semantics.groups import check_moment
+from socialai_dsl.semantics.resolve_names import without_arguments
+from socialai_dsl.semantics.resolver import INT, WORDED, Resolver, same_kind, text_value
 from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
@@ -23,47 +22,22 @@ from socialai_dsl.semantics.scope import (
     usage,
     wrong_count,
 )
-from socialai_dsl.semantics.signatures import (
-    ACTIVITIES,
-    EFFECTS,
-    PLACES,
-    QUANTIFIERS,
-    VALUE_SYNONYMS,
-    VALUES,
-)
 from socialai_dsl.semantics.terms import (
-    ACTION,
     BOOL,
-    CELL,
     DIRECTION,
     TURN,
-    CellOf,
     Compare,
     Const,
-    FieldOf,
-    Heard,
-    HeardNoun,
-    InState,
-    Measure,
     Not,
     Operation,
     ReadEach,
-    RelationName,
-    Sees,
     Select,
-    SitedTerm,
-    Speaker,
     Term,
-    Test,
     Type,
-    World,
     all_of,
     any_of,
     arithmetic,
     between,
-    constants,
-    draws,
-    entity,
     equals,
     holds_nothing,
     is_own_noun,
@@ -71,13 +45,9 @@ from socialai_dsl.semantics.terms import (
     may_find_nothing,
     number,
     one_of,
-    walk,
-    where_there_is,
 )
-from socialai_dsl.vocabulary import FINISHED
-
-_OF_BODIES = ("in_front_of", "eye_contact")
-"""Relations to something that can be turned to somewhere, which a cell is not."""
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUE_SYNONYMS, VALUES, WORDS
+from socialai_dsl.semantics.words.use import Use
 
 
 def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
@@ -90,51 +60,20 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         return tables.looked_up(resolver, node, scope)
     if node.name not in VALUES and (kept := rows.kept_for(resolver, node, scope)) is not None:
         return kept
-    signature = VALUES.get(node.name)
-    if signature is None:
+    word = VALUES.get(node.name)
+    if word is None:
         raise _unknown(resolver, node, scope)
-    most = len(signature.takes)
-    if not most - signature.optional <= len(node.args) <= most:
-        raise resolver.fail("S211", wrong_count(signature, len(node.args)), node, scope)
-    if signature.subject == "none":
-        return _function(resolver, node, expected, scope)
-    if not signature.takes:
+    most = len(word.takes)
+    if not most - word.optional <= len(node.args) <= most:
+        raise resolver.fail("S211", wrong_count(word, len(node.args)), node, scope)
+    if word.subject == "none" and node.subject is not None:
+        message = f"`{node.name}` has nothing before it: write `{node.name}(...)`"
+        raise resolver.fail("S211", message, node, scope)
+    if not word.takes:
         return without_arguments(resolver, node.name, node.subject, node, scope)
-    check_moment(resolver, signature, node, scope)
-    argument = node.args[0]
-    match node.name:
-        case "said":
-            return texts.said_by(resolver, node, scope)
-        case "heard":
-            _listener(resolver, node, scope)
-            return texts.heard(resolver, argument, scope)
-        case "did":
-            must_be_agent(resolver, node, scope)
-            return _did(resolver, argument, scope)
-        case "is":
-            return _is_in_state(resolver, node, scope)
-    subject = subject_of(resolver, node.subject, signature, node, scope)
-    if node.name == "looks_at":
-        assert subject is not None, "internal: a cell looks at nothing"
-        _check_viewer(resolver, subject, node, scope)
-    if node.name in get_args(RelationName):
-        return _relation(resolver, node.name, subject, argument, scope)
-    if node.name in ("joint_attention", "points_at", "toggled_by"):
-        assert subject is not None, "internal: a cell attends to nothing"
-        return _attention(resolver, subject, node, scope)
-    if node.name == "carries":
-        assert subject is not None, "internal: a cell carries nothing"
-        return hands.carries(resolver, subject, node, scope)
-    if node.name in ("sees", "would_see"):
-        assert subject is not None, "internal: a cell sees nothing"
-        return _sees(resolver, subject, node, scope)
-    other = resolver.somewhere(argument, scope)
-    assert subject is not None, "internal: only relations have the candidate cell as a subject"
-    if node.name == "distance":
-        (_, width), (_, height) = resolver.symbols.width, resolver.symbols.height
-        return Measure(Type("int", 0, width + height), "distance", (subject, other))
-    assert node.name == "dir_to", f"internal: no meaning for `{node.name}`"
-    return Measure(DIRECTION, "dir_to", (subject, other))
+    if word.subject != "none":
+        check_moment(resolver, word, node, scope)
+    return word.meaning(Use(resolver, word, node, node.subject, node.args, expected, scope))
 
 
 def _definition(resolver: Resolver, node: ast.Call, scope: Scope) -> tuple[Any, dict[str, ast.Expr]] | None:
@@ -177,201 +116,13 @@ def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> FailedError:
     return resolver.fail("S205", f"unknown {kind} `{node.name}`", node, scope, suggestion=near)
 
 
-# -- functions -------------------------------------------------------------------------------------------------
-
-
-def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
-    if node.subject is not None:
-        raise resolver.fail(
-            "S211", f"`{node.name}` has nothing before it: write `{node.name}(...)`", node, scope
-        )
-    if node.name in QUANTIFIERS:
-        if node.name not in ("pick", "first", "count"):
-            usage = "d in doors to agent" if node.name == "nearest" else "d in doors where ..."
-            raise resolver.fail("S211", f"write `{node.name}({usage})`", node, scope)
-        return groups.pick(resolver, node, expected, scope)
-    if node.name == "opposite":
-        way = resolver.value(node.args[0], DIRECTION, scope)
-        if isinstance(way, Const):
-            return Const(DIRECTION, (way.value + 2) % 4)
-        return Operation(DIRECTION, "turn", (way, number(2)))
-    if node.name == "prev":
-        return _before(resolver, node, expected, scope)
-    args = tuple(resolver.value(argument, INT, scope) for argument in node.args)
-    return resolver.computed(node.name, args, node, scope)
-
-
-def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
-    """`prev(e)`: a register that takes the value of e when a step begins."""
-    if scope.nested:
-        message = "`prev` cannot stand inside any(...), pick(...) and the like; put them inside `prev`"
-        raise resolver.fail("S211", message, node, scope)
-    check_moment(resolver, VALUES["prev"], node, scope)
-    term = resolver.value(node.args[0], expected, scope)
-    if any(isinstance(part, Heard | HeardNoun | Speaker) for part in walk(term)):
-        message = "what was heard is forgotten when a step ends; note it in a register of the frame"
-        raise resolver.fail("S211", message, node, scope)
-    if draws(term):
-        message = "`prev` asks how things were, so nothing can be drawn in it"
-        raise resolver.fail("S211", message, node, scope, hint="draw it in `let`, and use that")
-    site = f"{scope.draws.site}.prev[{node.at}]"
-    return resolver.registers.remember(SitedTerm(term, site, resolver.findings.node(scope.path, node)))
-
-
-def _listener(resolver: Resolver, node: ast.Call, scope: Scope) -> None:
-    itself = node.subject is None or (
-        isinstance(node.subject, ast.Name) and node.subject.id in ("self", scope.member)
-    )
-    if scope.frame is None or not itself:
-        message = "`heard` is known to the NPC itself, in its frame; elsewhere write `agent.said(...)`"
-        raise resolver.fail("S211", message, node, scope)
-
-
-def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast.Expr, scope: Scope) -> Term:
-    def related(other: Term) -> Term:
-        return Test(cast(RelationName, name), subject, other)
-
-    if name in _OF_BODIES and not groups.is_group(resolver, argument, scope):
-        return related(resolver.value(argument, ENTITY, scope))
-    return _each(resolver, argument, scope, related)
-
-
-def _attention(resolver: Resolver, subject: Term, node: ast.Call, scope: Scope) -> Term:
-    """What two members look at, what one points at, the one that toggled at something."""
-    first, *rest = node.args
-    if node.name == "toggled_by":
-        check_toggled(resolver, node.name, subject, node, scope)
-        return _toggled_by(resolver, subject, first, scope)
-    if node.name == "points_at":
-        check_points(resolver, node.name, subject, node, scope)
-        return _each(resolver, first, scope, lambda other: _points_at(subject, other))
-    other = resolver.value(first, ENTITY, scope)
-    if max(subject.type.high, other.type.high) >= len(resolver.symbols.numbers):
-        message = "only members of the cast attend to something together"
-        at = node if subject.type.high > other.type.high else first
-        hint = "`a.joint_attention(b, x)` is whether a and b both look at x"
-        raise resolver.fail("S204", message, at, scope, hint=hint)
-
-    def both_look(what: Term) -> Term:
-        return all_of([Test("looks_at", subject, what), Test("looks_at", other, what)])
-
-    if rest:
-        return _each(resolver, rest[0], scope, both_look)
-    numbers = range(len(resolver.symbols.numbers), resolver.symbols.entities)
-    return any_of(both_look(entity(number)) for number in numbers)
-
-
-def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) -> Term:
-    """Whether the member of the cast at `node`, whoever it is, toggled at something."""
-    who = resolver.value(node, ENTITY, scope)
-    if who.type.high >= len(resolver.symbols.numbers):
-        raise resolver.fail("S211", "`toggled_by` takes a member of the cast", node, scope)
-    if isinstance(who, Const):
-        return toggled_by(who, what)
-    cases = (all_of([Compare("==", who, one), toggled_by(one, what)]) for one in constants(who.type))
-    return where_there_is(who, any_of(cases))
-
-
-def _points_at(subject: Term, other: Term) -> Term:
-    ways = Type("int", 0, 4)
-    way = arithmetic(
-        "+", replace(Measure(DIRECTION, "dir_to", (subject, other)), type=Type("int", 0, 3)), number(1)
-    )
-    straight = all_of(
-        [Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)]
-    )
-    at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
-    # The arm of an NPC that leaves the room stays as it was, but points at nothing.
-    is_there = equals(FieldOf(BOOL, subject, "gone"), 0)
-    return all_of([any_of([all_of([at_it, is_there]), straight]), Not(Test("at", subject, other))])
-
-
-def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
-    """A relation to something, or to any of a group."""
-    if groups.is_group(resolver, node, scope):
-        return groups.any_member(resolver, node, scope, relation)
-    return relation(resolver.somewhere(node, scope))
-
-
-def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Term:
-    """`a.sees(x)`, `a.would_see(x, direction)`; of a group, any of it."""
-    _check_viewer(resolver, viewer, node, scope)
-    target, *rest = node.args
-
-    def seen(other: Term) -> Term:
-        # After what is seen: picks are numbered in source order.
-        return Sees(viewer, other, resolver.value(rest[0], DIRECTION, scope) if rest else None)
-
-    return _each(resolver, target, scope, seen)
-
-
-def _check_viewer(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> None:
-    if viewer.type.high >= len(resolver.symbols.numbers):
-        message = f"only a member of the cast has a view: `agent.{node.name}(...)`"
-        raise resolver.fail("S211", message, node, scope)
-
-
-def _did(resolver: Resolver, argument: ast.Expr, scope: Scope) -> Term:
-    action = World(ACTION, "action")
-    if groups.is_group(resolver, argument, scope):
-        return one_of(action, groups.group(resolver, argument, ACTION, scope).items)
-    return Compare("==", action, resolver.value(argument, ACTION, scope))
-
-
-def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
-    """`dancer.is(watching)`: the state is a bare word, looked up in the member's frame."""
-    who = resolver.value(node.subject, ENTITY, scope) if node.subject is not None else None
-    if who is not None and not isinstance(who, Const):
-        return _is_each_in_state(resolver, who, node, scope)
-    member = _member(resolver, who, node, scope)
-    argument = node.args[0]
-    own = scope.frame is not None and node.subject is None
-    frame = scope.frame if own else resolver.frames.get(member)
-    if frame is None and resolver.symbols.cast[member].frame is not None:
-        raise FailedError  # an unknown frame is reported where it is named
-    if frame is None:
-        called = quoted(node.subject) if node.subject is not None else member
-        raise resolver.fail("S310", f"`{called}` follows no frame, so it has no states", node, scope)
-    states = list(frame.model.states or ())
-    states += [step.state for _, step in frame.model.entries() if step.state] + (
-        [FINISHED] if frame.model.steps else []
-    )
-    if not isinstance(argument, ast.Name | ast.Truth):
-        raise resolver.fail("S211", "`is` takes the name of a state", argument, scope)
-    state = argument.id if isinstance(argument, ast.Name) else str(argument.value).lower()
-    if state not in states:
-        called = (resolver.symbols.group_of(member) or (member, 0))[0]
-        message = f"`{called}` has no state `{state}` (it plays `{frame.name}`: {', '.join(states)})"
-        raise resolver.fail("S310", message, argument, scope, suggestion=did_you_mean(state, states))
-    return InState(member, frame.name, state)
-
-
-def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
-    """`any(p in peers where p.is(ready))`, `leader.is(ready)`: of the member that is meant."""
-    members = resolver.symbols.members_of(who.type.values)
-    named = [member for member in members if member is not None]
-    if len(named) < len(members):
-        raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)
-    cases = []
-    for i, member in enumerate(named):
-        asked = replace(node, subject=ast.Name(member, at=node.at))
-        its = _is_in_state(resolver, asked, replace(scope, variables={}))
-        cases.append(all_of([equals(who, who.type.low + i), its]))
-    return where_there_is(who, any_of(cases))
-
-
-def _member(resolver: Resolver, who: Const | None, node: ast.Expr, scope: Scope) -> str:
-    member = scope.member if who is None else resolver.symbols.member_of(who.value)
-    if member is not None:
-        return member
-    raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)
-
-
 # -- every kind of expression --------------------------------------------------------------------------------
 
 
 class ScenarioResolver(Resolver):
     """The resolver of a scenario: the meaning of every kind of expression."""
+
+    words = WORDS
 
     def meaning(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         """The term for a tree by what kind of node it is."""

@@ -9,8 +9,8 @@ from itertools import chain, pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
-from socialai_dsl.semantics import hands, object_facts, rows, slots, texts
-from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
+from socialai_dsl.semantics import object_facts, rows, slots, texts
+from socialai_dsl.semantics.groups import check_moment, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
     Define,
@@ -26,86 +26,57 @@ from socialai_dsl.semantics.scope import (
     of_each,
     quoted,
     usage,
-    with_article,
     words_of,
 )
-from socialai_dsl.semantics.signatures import (
-    ACTIVITIES,
-    EFFECTS,
-    PLACES,
-    QUANTIFIERS,
-    VALUE_SYNONYMS,
-    VALUES,
-    WORDS,
-    Signature,
-)
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
-    ACTION,
     BOOL,
-    CELL,
-    COLOR,
-    DIRECTION,
     FALSE,
     TURN,
-    CellOf,
-    Compare,
     Const,
-    FieldOf,
-    Here,
-    PokedNow,
-    Read,
     Term,
     Type,
     Variable,
     World,
     all_of,
     any_of,
-    arithmetic,
-    as_number,
     entity,
-    equals,
-    number,
-    numbers_of,
 )
+from socialai_dsl.semantics.words import (
+    ACTIVITIES,
+    EFFECTS,
+    PLACES,
+    QUANTIFIERS,
+    RESERVED,
+    VALUE_SYNONYMS,
+    VALUES,
+)
+from socialai_dsl.semantics.words.attributes import coordinate
+from socialai_dsl.semantics.words.statuses import has_status
+from socialai_dsl.semantics.words.use import Use
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import normal
-
-_POINTING = Type("int", 0, 4)
-
-
-def toggled_by(who: Const, what: Term) -> Term:
-    """Whether the agent toggled at something in this step, or an NPC did so in its last turn."""
-    if who.value == 0:
-        return PokedNow(what)
-    return Compare("==", FieldOf(what.type, who, "toggled"), what)
 
 
 def without_arguments(
     resolver: Resolver, name: str, subject: ast.Expr | None, node: ast.Expr, scope: Scope
 ) -> Term:
     """`subject.name` or `subject.name()`: an attribute, a condition, or a status."""
-    signature = VALUES.get(name)
+    assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
     if name in resolver.symbols.slots:
-        signature = replace(VALUES["noun"], name=name)
-    if signature is None or signature.takes:
-        if name not in _statuses(resolver):
-            raise _unknown_attribute(resolver, name, signature, node, scope)
-        signature = Signature(name, "object", (), "condition", "")
-    check_moment(resolver, signature, node, scope)
-    if signature.subject == "agent":
-        assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
-        if name == "spoke":
-            return texts.spoke(resolver, node, scope)
+        check_moment(resolver, Signature(name, "agent", (), "noun", "", momentary=True), node, scope)
         must_be_agent(resolver, node, scope)
-        return _of_the_agent(resolver, name, node, scope)
-    who = subject_of(resolver, subject, signature, node, scope)
-    if who is None:
-        return _cell_coordinate(resolver, name)
-    if name == "unlocked_by":
-        return object_facts.unlocker(resolver, who, node, scope)
-    if signature.subject == "object" and name not in ("inside", "toggled"):
-        return _status(resolver, name, who, node, scope)
-    return _attribute(resolver, name, who, node, scope)
+        return _in_slot(resolver, name, heard=False)
+    word = VALUES.get(name)
+    if word is not None and not word.takes:
+        check_moment(resolver, word, node, scope)
+        return word.meaning(Use(resolver, word, node, subject, (), None, scope))
+    if name not in _statuses(resolver):
+        raise _unknown_attribute(resolver, name, word, node, scope)
+    status = Signature(name, "object", (), "condition", "")
+    who = subject_of(resolver, subject, status, node, scope)
+    assert who is not None, "internal: the candidate cell has no status"
+    return has_status(resolver, name, who, node, scope)
 
 
 def _unknown_attribute(
@@ -134,140 +105,6 @@ def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
     subject = node.subject if isinstance(node, ast.Attribute) else None
     played = resolver.frames.get(subject.id) if isinstance(subject, ast.Name) else None
     return [*played.model.slots, *played.model.let] if played is not None else []
-
-
-def _of_the_agent(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
-    if name in resolver.symbols.slots:
-        return _in_slot(resolver, name, heard=False)
-    if name == "noun":
-        texts.no_nouns(resolver, node, scope)
-        return World(resolver.symbols.nouns, "noun")
-    assert name == "action", f"internal: the agent has no `{name}`"
-    return World(ACTION, "action")
-
-
-def _cell_coordinate(resolver: Resolver, name: str) -> Term:
-    high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
-    return Here(Type("int", 0, high - 1), "x" if name == "x" else "y")
-
-
-def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    match name:
-        case "color":
-            return FieldOf(COLOR, who, "color")
-        case "facing":
-            return FieldOf(DIRECTION, who, "dir")
-        case "x" | "y":
-            high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
-            return FieldOf(Type("int", -1, high - 1), who, "x" if name == "x" else "y")
-        case "gone":
-            return FieldOf(BOOL, who, "gone")
-        case "was_poked":
-            if resolver.symbols.object_of(who.type.high) is not None:
-                message = "only an NPC remembers that it was poked"
-                raise resolver.fail(
-                    "S204", message, node, scope, hint="`x.poked` is whether it was in this step"
-                )
-            return FieldOf(BOOL, who, "poked")
-        case "poked":
-            return PokedNow(who)
-        case "index":
-            return _index(resolver, who, node, scope)
-        case "cell":
-            return CellOf(CELL, who)
-        case "pointing":
-            check_points(resolver, name, who, node, scope)
-            return Compare("!=", FieldOf(_POINTING, who, "pointing"), Const(_POINTING, 0))
-        case "inside":
-            return object_facts.container(resolver, who, node, scope)
-        case "carried":
-            return hands.carried(resolver, who, node, scope)
-        case "empty_handed":
-            return hands.empty_handed(resolver, who, node, scope)
-        case "toggled":
-            check_toggled(resolver, name, who, node, scope)
-            everybody = range(len(resolver.symbols.numbers))
-            return any_of(toggled_by(entity(number), who) for number in everybody)
-        case "turns_in_state":
-            return _turns_in_state(resolver, who, node, scope)
-        case "kind":
-            return _kind(resolver, who, node, scope)
-    assert name == "name", f"internal: no meaning for the attribute `{name}`"
-    return _name(resolver, who, node, scope)
-
-
-def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    members = resolver.symbols.members_of(numbers_of(who))
-    names = [resolver.registers.read(f"{member}.name") for member in members if member is not None]
-    if len(names) < len(members):
-        raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
-    return of_each(who, names)
-
-
-def _turns_in_state(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    """The clock of a member's frame, which `after` compares as well."""
-    members = resolver.symbols.members_of(numbers_of(who))
-    if not all(member in resolver.frames for member in members):
-        hint = "members of the cast follow one with `frame:`"
-        raise resolver.fail("S204", "only who follows a frame is in a state", node, scope, hint=hint)
-    turns = Type("int", 0, resolver.symbols.scenario.horizon)
-    return of_each(who, [Read(turns, f"{member}.clock") for member in members])
-
-
-def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    kinds = {_kind_of(resolver, n) for n in who.type.values}
-    if len(kinds) > 1:
-        raise resolver.fail("S204", "`kind` is known of one thing, or of things of one kind", node, scope)
-    return Const(Type("text", 0, 0, (kinds.pop(),)), 0)
-
-
-def _kind_of(resolver: Resolver, entity: int) -> str:
-    objects = resolver.symbols.object_of(entity)
-    if objects is not None:
-        return objects.type.name
-    member = resolver.symbols.member_of(entity)
-    assert member is not None, "internal: an entity is an object or in the cast"
-    return resolver.symbols.cast[member].kind or "peer"
-
-
-def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    members = resolver.symbols.members_of((who.type.low, who.type.high))
-    groups = [resolver.symbols.group_of(member) for member in members if member is not None]
-    if len(groups) == 2 and groups[0] is not None and groups[1] is not None and groups[0][0] == groups[1][0]:
-        first = who.type.low - groups[0][1]
-    else:
-        objects = resolver.symbols.object_of(who.type.low)
-        if objects is None or who.type.high not in objects.numbers:
-            raise resolver.fail("S204", "only one of a group has an `index`, its place in it", node, scope)
-        first = objects.numbers[0]
-    if isinstance(who, Const):
-        return number(who.value - first)
-    return arithmetic("-", as_number(who), number(first))
-
-
-def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    field = status_of(resolver, who, node, scope)
-    if status not in field.type.words:
-        what = resolver.symbols.object_of(who.type.low)
-        assert what is not None, "internal: a status belongs to an object"
-        message = f"{with_article(what.type.name)} is never `{status}`; it is {' or '.join(field.type.words)}"
-        raise resolver.fail("S204", message, node, scope, suggestion=did_you_mean(status, field.type.words))
-    return equals(field, field.type.words.index(status))
-
-
-def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> FieldOf:
-    """The status of one object, or of one of several objects of the same type."""
-    found = [resolver.symbols.object_of(n) for n in who.type.values]
-    types = {objects.type.name: objects.type for objects in found if objects is not None}
-    if None in found or len(types) != 1:
-        several = [*types, *(["member of the cast"] if None in found else [])]
-        message = f"this may be a {' or a '.join(several)}, which have no status in common"
-        hint: str | None = "name objects of one type, which stand next to each other in `objects`"
-        if not types:
-            message, hint = "only objects have a status", None
-        raise resolver.fail("S204", message, node, scope, hint=hint)
-    (type_,) = types.values()
-    return FieldOf(Type("status", 0, len(type_.states) - 1, type_.states), who, "status")
 
 
 # -- names ---------------------------------------------------------------------------------------------------
@@ -551,7 +388,7 @@ def suggestion(
     """The name that was probably meant, and where it is declared."""
     declared = resolver.symbols.declared
     near = did_you_mean(word, chain(declared, *_nearby(expected, scope))) or did_you_mean(
-        word, [*WORDS, *VALUES]
+        word, [*RESERVED, *VALUES]
     )
     if near is None or near not in declared:
         return near, None
@@ -585,7 +422,7 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     if isinstance(node.subject, ast.Name):
         owner = node.subject.id
         if owner == "here" and node.name in ("x", "y") and scope.here:
-            return _cell_coordinate(resolver, node.name)
+            return coordinate(resolver, node.name, None)
         several = scope.variables.get(owner)
         if isinstance(several, Variable) and node.name not in VALUES:
             found = _of_each(resolver, several, node.name)

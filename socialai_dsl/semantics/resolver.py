@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import islice, product
 from math import prod
-from typing import Final
+from typing import ClassVar, Final
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.plans import Drawn
@@ -28,7 +28,7 @@ from socialai_dsl.semantics.scope import (
     spoken,
     words_of,
 )
-from socialai_dsl.semantics.signatures import VALUES, WORDS
+from socialai_dsl.semantics.signatures import Words
 from socialai_dsl.semantics.terms import (
     ACTION,
     COLOR,
@@ -531,6 +531,7 @@ class Resolver(ABC):
     """Gives meaning to the expressions of one scenario: what each part of the language is resolved with.
 
     Attributes:
+        words: those of the language.
         symbols: what the scenario declares.
         findings: where mistakes go.
         registers: what is drawn or computed at reset, resolved when first needed.
@@ -543,6 +544,8 @@ class Resolver(ABC):
         addresses: whether the agent or an NPC addresses a single hearer.
         tables, links, moved_inside: what `tables` and `object_facts` have found out already.
     """
+
+    words: ClassVar[Words]
 
     def __init__(
         self,
@@ -713,7 +716,11 @@ class Resolver(ABC):
 
     def means_nothing(self, word: str, scope: Scope) -> bool:
         """Whether a word is neither declared nor of the language: where a text is expected, it is one."""
-        known = any(word in type_.words for type_ in VOCABULARIES) or word in WORDS or word in VALUES
+        known = (
+            any(word in type_.words for type_ in VOCABULARIES)
+            or word in self.words.reserved
+            or word in self.words.values
+        )
         return not known and not self._names_something(word, scope)
 
     def _names_something(self, word: str, scope: Scope) -> bool:
@@ -729,7 +736,7 @@ class Resolver(ABC):
         ):
             return True
         in_vocabulary = any(word in type_.words for type_ in VOCABULARIES)
-        return word in VALUES and not in_vocabulary
+        return word in self.words.values and not in_vocabulary
 
     def is_wordy(self, node: ast.Expr, scope: Scope) -> bool:
         """Whether an expression comes down to bare words that several vocabularies have, such as `left`."""

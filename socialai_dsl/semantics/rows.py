@@ -21,7 +21,6 @@ from socialai_dsl.semantics.scope import (
     reset_scope,
     surviving,
 )
-from socialai_dsl.semantics.signatures import WORDS
 from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term, Type, entity, numbers_of
 from socialai_dsl.source import DataPath
 from socialai_dsl.widths import LARGEST_NUMBER
@@ -139,7 +138,7 @@ def _check_words(resolver: Resolver, name: str, look: Look) -> None:
         findings.error("S213", message, findings.places.key_span(("looks", name)))
     for i, word in enumerate(look.words):
         span = findings.at(("looks", name, "words", i), 0, len(word))
-        if word in resolver.symbols.declared or word in WORDS or word == "none":
+        if word in resolver.symbols.declared or word in resolver.words.reserved or word == "none":
             findings.error("S213", f"`{word}` means something else already; call the value otherwise", span)
         elif word in look.words[:i]:
             findings.error("S213", f"`{word}` is a value of `{name}` already", span)

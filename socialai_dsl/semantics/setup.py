@@ -24,13 +24,12 @@ from socialai_dsl.semantics.scope import (
     quoted,
     reset_scope,
     surviving,
+    wrong_count,
 )
-from socialai_dsl.semantics.signatures import PLACES
 from socialai_dsl.semantics.terms import (
     BOOL,
     COLOR,
     DIRECTION,
-    SIDE,
     CellBeside,
     CellOf,
     Const,
@@ -42,13 +41,13 @@ from socialai_dsl.semantics.terms import (
     SitedTerm,
     Term,
     Test,
-    Type,
     World,
     chosen,
     walk,
 )
+from socialai_dsl.semantics.words import PLACES
+from socialai_dsl.semantics.words.places import Placed
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import SIDES
 
 
 @dataclass(frozen=True)
@@ -114,28 +113,14 @@ def _region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None)
         body = resolver.findings.expression(define.path, define.raw)
         inner = replace(scope, path=define.path, within=(*scope.within, name))
         return tuple(_regions(resolver, body, inner, spot))
-    match name:
-        case "anywhere" | "left_half" | "right_half" | "top_half" | "bottom_half":
-            _takes(resolver, node, args, 0, scope)
-            return (Region(name),)
-        case "column" | "row":
-            _takes(resolver, node, args, 1, scope)
-            return (Region(name, (resolver.value(args[0], INT, scope),)),)
-        case "rect":
-            _takes(resolver, node, args, 4, scope)
-            return (Region(name, tuple(resolver.value(arg, INT, scope) for arg in args)),)
-        case "next_to" | "in_front_of":
-            _takes(resolver, node, args, 1, scope)
-            return tuple(Region(name, (target,)) for target in _targets(resolver, args[0], scope))
-        case "wall":
-            _takes(resolver, node, args, 1, scope)
-            side = resolver.value(args[0], SIDE, scope)
-            if isinstance(side, Const):
-                return (Region("wall", side=SIDES[side.value]),)
-            return (Region("wall", (side,)),)
-        case "each_wall":
-            return (_each_wall(resolver, node, args, scope, spot),)
-    raise _unknown(resolver, name, node, scope)
+    word = PLACES.get(name)
+    if word is None:
+        raise _unknown(resolver, name, node, scope)
+    most = len(word.takes)
+    if not most - word.optional <= len(args) <= most:
+        raise resolver.fail("S211", wrong_count(word, len(args)), node, scope)
+    whose = (spot.index, spot.count) if spot is not None else (0, None)
+    return word.meaning(Placed(resolver, word, node, args, scope, *whose))
 
 
 def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[ast.Expr, ...]]:
@@ -150,39 +135,8 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
     raise resolver.fail("S204", f"`{quoted(node)}` is not a place", node, scope, hint=hint)
 
 
-def _takes(resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], count: int, scope: Scope) -> None:
-    if len(args) != count:
-        name = node.id if isinstance(node, ast.Name) else node.name if isinstance(node, ast.Call) else ""
-        takes = ", ".join(PLACES[name].takes) if name in PLACES and count else "nothing" if not count else "x"
-        raise resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
-
-
-def _targets(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
-    if groups.is_group(resolver, node, scope):
-        return groups.group(resolver, node, None, scope).items
-    return (resolver.value(node, ENTITY, scope),)
-
-
-def _each_wall(
-    resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], scope: Scope, spot: Spot | None
-) -> Region:
-    """The wall of this member of the group: top, bottom, left, right in turn."""
-    margin = resolver.value(args[0], INT, scope) if args else Const(Type("int", 1, 1), 1)
-    if len(args) > 1 or not isinstance(margin, Const) or margin.value < 1:
-        raise resolver.fail(
-            "S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope
-        )
-    if spot is None or spot.count > len(SIDES) or spot.count < 2:
-        message = "`each_wall` is for a group of two to four, one in each wall"
-        raise resolver.fail(
-            "S204", message, node, scope, hint="give `count: 4`; for one thing write `wall(top)`"
-        )
-    return Region("wall", side=SIDES[spot.index], margin=margin.value)
-
-
 def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
-    places = [*PLACES, "next_to", "in_front_of"]
-    advice = advice_on(name, places, "places are " + ", ".join(places))
+    advice = advice_on(name, PLACES, "places are " + ", ".join(PLACES))
     return resolver.fail("S205", f"unknown place `{name}`", node, scope, **advice)
 
 

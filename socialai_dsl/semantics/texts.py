@@ -25,7 +25,6 @@ from socialai_dsl.semantics.scope import (
     select,
     spoken,
 )
-from socialai_dsl.semantics.signatures import VALUES
 from socialai_dsl.semantics.terms import (
     TURN,
     Compare,
@@ -573,7 +572,7 @@ def speakers(
         must_be_agent(resolver, node, scope)
         return [("agent", [])]
     name = "" if isinstance(node, ast.Name) else node.name
-    who = subject_of(resolver, subject, VALUES[name], node, scope)
+    who = subject_of(resolver, subject, resolver.words.values[name], node, scope)
     assert who is not None, "internal: a cell says nothing"
     numbers = numbers_of(who)
     members = resolver.symbols.members_of(numbers)

@@ -9,6 +9,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, FramePlan, LookPlan
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import FieldOf, Read, SitedTerm, Term, walk
+from socialai_dsl.semantics.words import ACTIVITIES
 from socialai_dsl.source import Span
 
 _GESTURES: Final = 4
@@ -74,7 +75,11 @@ def _asked_elsewhere(checked: CheckedScenario, asks: Reads) -> bool:
 def _pointing(checked: CheckedScenario) -> Iterator[tuple[str, Span]]:
     """Members that point, and where that is written."""
     for frame in checked.frames:
-        yield from ((f"`{frame.member}`", one.span) for one in frame.activities if one.name == "point")
+        yield from (
+            (f"`{frame.member}`", one.span)
+            for one in frame.activities
+            if ACTIVITIES[one.name].arm == "points"
+        )
 
 
 def _asks_who_points(term: Term) -> bool:

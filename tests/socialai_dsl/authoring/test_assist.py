@@ -6,7 +6,7 @@ import pytest
 
 from socialai_dsl.authoring.assist import complete, explain, usage
 from socialai_dsl.loader.reader import read_document
-from socialai_dsl.semantics.signatures import SIGNATURES
+from socialai_dsl.semantics.words import SIGNATURES
 from socialai_dsl.source import Source
 from tests.socialai_dsl.authoring.marked import marked
 

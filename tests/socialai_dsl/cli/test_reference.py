@@ -7,7 +7,7 @@ import pytest
 
 from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.schema.annotations import CALLED, keys_of
-from socialai_dsl.semantics.signatures import SIGNATURES
+from socialai_dsl.semantics.words import SIGNATURES
 from tools.reference import main
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference.md"

@@ -30,7 +30,7 @@ from socialai_dsl.schema.scenario import (
     WrittenCast,
 )
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.signatures import VALUES
+from socialai_dsl.semantics.words import VALUES
 
 WRITTEN_OTHERWISE = {CastGroup, WrittenCast, VariantFile, GrammarLibrary, ObjectLibrary, Hyper}
 """Models of what the loader takes apart, of libraries, and of options of the trainer, which have their own pages."""

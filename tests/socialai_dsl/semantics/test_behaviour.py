@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import Const, Heard, Logic, Operation, Quantification, Read
+from socialai_dsl.semantics.words import ACTIVITIES
 from socialai_dsl.vocabulary import PRIMITIVES
 
 

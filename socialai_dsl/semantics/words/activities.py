@@ -1,0 +1,287 @@
+"""Words for what a member of the cast does: one body action a turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import parse_expression
+from socialai_dsl.semantics import groups, hands
+from socialai_dsl.semantics.groups import performed
+from socialai_dsl.semantics.plans import Activity
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
+from socialai_dsl.semantics.scope import FailedError, Scope, quoted, with_article
+from socialai_dsl.semantics.signatures import Argument, Signature
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    BOOL,
+    CELL,
+    DIRECTION,
+    TURN,
+    CellOf,
+    Measure,
+    Term,
+    Type,
+    entity,
+)
+from socialai_dsl.semantics.words.statuses import status_of
+from socialai_dsl.source import DataPath
+from socialai_dsl.vocabulary import PRIMITIVES, Primitive
+
+Moves = Literal["walks", "turns", "stays"]
+
+
+@dataclass(frozen=True, slots=True)
+class Doing:
+    """An activity's word where it is written.
+
+    Attributes:
+        word: its row of the table. node: all of it, for messages. args: what is written in brackets.
+        path: where the value stands that it is.
+    """
+
+    resolver: Resolver
+    word: Deed
+    node: ast.Expr
+    args: tuple[ast.Expr, ...]
+    path: DataPath
+    scope: Scope
+
+    def activity(self, *args: Term, name: str | None = None) -> Activity:
+        """The activity with these arguments; `name`: another one that it comes to."""
+        span = self.resolver.findings.at(self.path)
+        return Activity(name or self.word.name, args, self.scope.draws.site, span)
+
+    def one(self, place: int) -> Term:
+        """Somebody or something that it is about; not a group, of which it is not said which one is meant."""
+        self._say_which(place)
+        return self.resolver.value(self.args[place], ENTITY, self.scope)
+
+    def somewhere(self, place: int) -> Term:
+        """The same, or a cell."""
+        self._say_which(place)
+        return self.resolver.somewhere(self.args[place], self.scope)
+
+    def _say_which(self, place: int) -> None:
+        node = self.args[place]
+        if groups.is_group(self.resolver, node, self.scope):
+            group, more = quoted(node), ", ..." if len(self.word.takes) > 1 else ""
+            hint = f"`{self.word.name}(nearest(d in {group} to self){more})`, or draw one in `let` with `pick({group})`"
+            raise self.fail("S204", f"`{group}` is a group: say which of them", node, hint=hint)
+
+    def fail(self, code: str, message: str, node: ast.Expr | None = None, **more: str | None) -> FailedError:
+        """Report what is wrong with it, or with a part of it; raising the result gives it up."""
+        return self.resolver.fail(code, message, node or self.node, self.scope, **more)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deed(Signature):
+    """A word for an activity.
+
+    Attributes:
+        meaning: the activity that a use of it stands for.
+        moves: what becomes of the member that does it.
+        endless: it never ends by itself, so that a step of it says how long it lasts.
+        handles: the body actions that it takes besides walking and turning.
+        goes: where it leads: to the cell of what it is about, or to one beside it.
+        act: the body action with which it is over, which may move or replace what it is done to.
+        lapses: it takes no step where it is fulfilled before it begins.
+        arm: what becomes of an arm that points, which the agent lacks: it points, or it is taken down.
+    """
+
+    meaning: Callable[[Doing], Activity]
+    moves: Moves = "walks"
+    endless: bool = False
+    handles: tuple[Primitive, ...] = ()
+    goes: Literal["there", "beside"] | None = None
+    act: Primitive | None = None
+    lapses: bool = False
+    arm: Literal["points", "rests"] | None = None
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """The body actions that it may take, whatever stands in its brackets."""
+        if self.name in PRIMITIVES:
+            return (self.name,)
+        return (*_MOVES[self.moves], *self.handles)
+
+    @property
+    def of_hands(self) -> bool:
+        """Whether it is about a thing that is carried."""
+        return len(self.takes) > 0 and self.act in ("pickup", "drop")
+
+
+_MOVES: Final = {"walks": ("left", "right", "forward"), "turns": ("left", "right"), "stays": ()}
+_TYPES: Final[Mapping[str, Type]] = {"direction": DIRECTION, "turn": TURN, "int": INT}
+"""What is expected of an argument, by what the word takes."""
+
+
+def _plain(doing: Doing) -> Activity:
+    """An activity of the arguments that it takes."""
+    terms = [
+        doing.one(place)
+        if takes == "entity"
+        else doing.resolver.value(doing.args[place], _TYPES[takes], doing.scope)
+        for place, takes in enumerate(doing.word.takes)
+    ]
+    return doing.activity(*terms)
+
+
+def _to_a_place(doing: Doing) -> Activity:
+    """One for which a cell will do."""
+    return doing.activity(doing.somewhere(0))
+
+
+def _follow(doing: Doing) -> Activity:
+    return doing.activity(doing.one(0), name="go_next_to")
+
+
+def _of_hands(doing: Doing) -> Activity:
+    bring = doing.word.name == "bring"
+    terms = tuple(doing.somewhere(place) if bring else doing.one(place) for place in range(len(doing.args)))
+    hands.check_arguments(doing.resolver, doing.word.name, terms, doing.args, doing.scope)
+    return doing.activity(*terms)
+
+
+def _search(doing: Doing) -> Activity:
+    """It is over when the searcher sees what it looks for."""
+    assert isinstance(doing.node, ast.Call), "internal: it has an argument"
+    sees = replace(doing.node, name="sees")
+    return doing.activity(doing.resolver.value(sees, BOOL, doing.scope))
+
+
+def _enter(doing: Doing) -> Activity:
+    """Only objects of one type that can be walked on can be entered."""
+    what = doing.one(0)
+    if what.type.low < len(doing.resolver.symbols.numbers):
+        message = f"`{quoted(doing.args[0])}` is no object; only objects can be entered"
+        raise doing.fail("S204", message, doing.args[0])
+    status_of(doing.resolver, what, doing.args[0], doing.scope)
+    objects = doing.resolver.symbols.object_of(what.type.low)
+    assert objects is not None, "internal: what has a status is an object"
+    if not objects.type.walkable:
+        message = f"{with_article(objects.type.name)} can never be entered"
+        raise doing.fail("S204", message, doing.args[0])
+    return doing.activity(what)
+
+
+def _push(doing: Doing) -> Activity:
+    what = doing.one(0)
+    for number in what.type.values:
+        objects = doing.resolver.symbols.object_of(number)
+        if objects is None or not objects.type.pushed:
+            message = f"`{quoted(doing.args[0])}` cannot be pushed"
+            able = [key for key, type_ in doing.resolver.symbols.types.items() if type_.pushed]
+            raise doing.fail("S204", message, doing.args[0], hint="what can be: " + ", ".join(able))
+    return doing.activity(what, doing.resolver.value(doing.args[1], DIRECTION, doing.scope))
+
+
+def _point(doing: Doing) -> Activity:
+    """The way x lies."""
+    assert doing.scope.member is not None, "internal: an activity is somebody's"
+    own = entity(doing.resolver.symbols.numbers[doing.scope.member])
+    there = doing.resolver.somewhere(doing.args[0], doing.scope)
+    return doing.activity(Measure(DIRECTION, "dir_to", (own, there)))
+
+
+def _point_at(doing: Doing) -> Activity:
+    """The cell of x."""
+    there = doing.resolver.somewhere(doing.args[0], doing.scope)
+    return doing.activity(CellOf(CELL, there), name="point")
+
+
+def _perform(doing: Doing) -> Activity:
+    return doing.activity(*performed(doing.resolver, doing.args[0], doing.scope))
+
+
+def _choose(doing: Doing) -> Activity:
+    return _choice(doing, doing.args[0])
+
+
+def _wander(doing: Doing) -> Activity:
+    return _choice(doing, parse_expression("forward | left | right"))
+
+
+def _choice(doing: Doing, node: ast.Expr) -> Activity:
+    ordinal = doing.scope.draws.number()
+    members = groups.group(doing.resolver, _with_stay(node), ACTION, doing.scope)
+    if members.type != ACTION:
+        message = f"`{quoted(node)}` are not actions; write choose(forward | left)"
+        raise doing.fail("S204", message, node)
+    weights = {item: members.items.count(item) for item in members.items}
+    chosen = doing.activity(*weights, name="choose")
+    return replace(chosen, weights=tuple(weights.values()), ordinal=ordinal)
+
+
+def _with_stay(node: ast.Expr) -> ast.Expr:
+    """`stay` among the options is the action `none`: the word that stands alone in a `do:` may stand here too."""
+    if isinstance(node, ast.Alternatives):
+        return replace(node, options=tuple(map(_with_stay, node.options)))
+    return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
+
+
+def _deed(
+    name: str,
+    takes: tuple[Argument, ...],
+    doc: str,
+    *,
+    moves: Moves = "walks",
+    endless: bool = False,
+    handles: tuple[Primitive, ...] = (),
+    goes: Literal["there", "beside"] | None = None,
+    act: Primitive | None = None,
+    lapses: bool = False,
+    arm: Literal["points", "rests"] | None = None,
+    also: tuple[str, ...] = (),
+    meaning: Callable[[Doing], Activity] = _plain,
+) -> Deed:
+    return Deed(
+        name, "none", takes, "activity", doc, "activity", moves=moves, endless=endless, handles=handles, goes=goes,
+        act=act, lapses=lapses, arm=arm, also=also, meaning=meaning,
+    )  # fmt: skip
+
+
+ACTIVITIES: Final = (
+    _deed("stay", (), "do nothing", moves="stays", endless=True, also=("wait", "nothing", "none", "idle")),
+    _deed("left", (), "a quarter turn left", moves="turns"),
+    _deed("right", (), "a quarter turn right", moves="turns"),
+    _deed("forward", (), "one cell ahead"),
+    _deed("toggle", (), "use what is ahead", moves="stays"),
+    _deed("pickup", (), "take what is ahead into its hands", moves="stays", also=("pick_up",)),
+    _deed("drop", (), "lay down ahead what it carries, or give it to the member that stands there", moves="stays",
+          also=("put_down", "lay_down")),
+    _deed("face", ("entity",), "turn towards x, a quarter turn a step", moves="turns", endless=True,
+          also=("look", "look_at", "watch", "gaze"), meaning=_to_a_place),
+    _deed("turn_to", ("direction",), "turn to a direction, a quarter turn a step", moves="turns"),
+    _deed("turn", ("turn",), "a quarter turn left or right", moves="turns", also=("rotate",)),
+    _deed("go_to", ("entity",), "walk to the cell of x", goes="there", lapses=True,
+          also=("walk", "walk_to", "go", "move_to", "move", "goto"), meaning=_to_a_place),
+    _deed("go_next_to", ("entity",), "walk to a cell next to x", goes="beside", lapses=True,
+          also=("approach", "come_to"), meaning=_to_a_place),
+    _deed("use", ("entity",), "go next to x, face it, toggle it", handles=("toggle",), goes="beside", act="toggle",
+          also=("press", "push_button", "open", "pick", "activate", "interact")),
+    _deed("fetch", ("entity",), "go next to x, face it, pick it up", handles=("pickup",), act="pickup",
+          also=("take", "grab", "get"), meaning=_of_hands),
+    _deed("give", ("entity", "entity"), "go next to y and hand over x, if it carries x", handles=("drop",), act="drop",
+          also=("hand", "hand_over"), meaning=_of_hands),
+    _deed("bring", ("entity", "entity"), "fetch x, then give it to y, or lay it down on the cell of y",
+          handles=("pickup", "drop"), act="drop", also=("carry", "deliver"), meaning=_of_hands),
+    _deed("search", ("entities",), "look around, then walk about, until it sees x", lapses=True,
+          also=("look_for", "find", "explore", "seek", "look_around"), meaning=_search),
+    _deed("enter", ("entity",), "open x if it is closed, then go in", handles=("toggle",), goes="there", lapses=True,
+          also=("go_through", "exit"), meaning=_enter),
+    _deed("push", ("entity", "direction"), "go behind x and push it that way", act="forward", meaning=_push),
+    _deed("point", ("entity",), "point the way x lies", moves="stays", arm="points", meaning=_point),
+    _deed("point_at", ("entity",), "point at the cell of x, in any direction", moves="stays", arm="points",
+          also=("points_at", "point_to"), meaning=_point_at),
+    _deed("stop_pointing", (), "take the arm down", moves="stays", arm="rests"),
+    _deed("follow", ("entity",), "walk next to x, again and again", endless=True, meaning=_follow),
+    _deed("stay_near", ("entity", "int"), "walk towards x while it is more than n cells away", endless=True),
+    _deed("flee", ("entity",), "turn away from x and walk", endless=True),
+    _deed("perform", ("sequence",), "one act of a sequence a turn, words included", also=("dance", "repeat"),
+          meaning=_perform),
+    _deed("choose", ("actions",), "one at random: choose(a | b | 2 * c)", endless=True, meaning=_choose),
+    _deed("wander", (), "choose(forward | left | right)", endless=True, also=("random",), meaning=_wander),
+)  # fmt: skip

@@ -1,0 +1,91 @@
+"""Words that are written like functions: of numbers, of a direction, of the step before, of a group."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.groups import check_moment
+from socialai_dsl.semantics.resolver import INT
+from socialai_dsl.semantics.terms import (
+    DIRECTION,
+    Const,
+    Heard,
+    HeardNoun,
+    Operation,
+    SitedTerm,
+    Speaker,
+    Term,
+    draws,
+    number,
+    walk,
+)
+from socialai_dsl.semantics.words.use import Use, Value
+
+
+def _computed(use: Use) -> Term:
+    """A function of numbers that the engine has an operation for."""
+    args = tuple(use.value(place, INT) for place in range(len(use.args)))
+    return use.resolver.computed(use.signature.name, args, use.node, use.scope)
+
+
+def _opposite(use: Use) -> Term:
+    way = use.value(0, DIRECTION)
+    if isinstance(way, Const):
+        return Const(DIRECTION, (way.value + 2) % 4)
+    return Operation(DIRECTION, "turn", (way, number(2)))
+
+
+def _before(use: Use) -> Term:
+    """`prev(e)`: a register that takes the value of e when a step begins."""
+    if use.scope.nested:
+        message = "`prev` cannot stand inside any(...), pick(...) and the like; put them inside `prev`"
+        raise use.fail("S211", message)
+    check_moment(use.resolver, use.signature, use.node, use.scope)
+    term = use.value(0, use.expected)
+    if any(isinstance(part, Heard | HeardNoun | Speaker) for part in walk(term)):
+        message = "what was heard is forgotten when a step ends; note it in a register of the frame"
+        raise use.fail("S211", message)
+    if draws(term):
+        message = "`prev` asks how things were, so nothing can be drawn in it"
+        raise use.fail("S211", message, hint="draw it in `let`, and use that")
+    site = f"{use.scope.draws.site}.prev[{use.node.at}]"
+    span = use.resolver.findings.node(use.scope.path, use.node)
+    return use.resolver.registers.remember(SitedTerm(term, site, span))
+
+
+def _whole_group(use: Use) -> Term:
+    """Of a group without a condition: `pick(doors)`."""
+    assert isinstance(use.node, ast.Call), "internal: it has an argument"
+    return groups.pick(use.resolver, use.node, use.expected, use.scope)
+
+
+def _needs_more(use: Use) -> Term:
+    name = use.signature.name
+    parts = "d in doors to agent" if name == "nearest" else "d in doors where ..."
+    raise use.fail("S211", f"write `{name}({parts})`")
+
+
+FUNCTIONS: Final = (
+    Value("min", "none", ("int", "int"), "number", "the smaller", meaning=_computed),
+    Value("max", "none", ("int", "int"), "number", "the larger", meaning=_computed),
+    Value("abs", "none", ("int",), "number", "without its sign", meaning=_computed),
+    Value("opposite", "none", ("direction",), "direction", "the direction turned round", meaning=_opposite),
+    Value("prev", "none", ("any",), "the same", "prev(e): e as it was when the step began", momentary=True,
+          also=("previous", "before"), meaning=_before),
+)  # fmt: skip
+
+QUANTIFIERS: Final = (
+    Value("any", "none", ("group",), "condition", "any(d in group where ...): one of them does", meaning=_needs_more),
+    Value("all", "none", ("group",), "condition", "all(d in group where ...): each of them does", meaning=_needs_more),
+    Value("count", "none", ("group",), "number", "count(d in group where ...): how many do", meaning=_whole_group),
+    Value("first", "none", ("group",), "one of them", "first(d in group where ...): the first that does",
+          meaning=_whole_group),
+    Value("pick", "none", ("group",), "one of them", "pick(group), pick(d in group where ...): drawn at random",
+          meaning=_whole_group),
+    Value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y",
+          meaning=_needs_more),
+    Value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do",
+          meaning=_needs_more),
+)  # fmt: skip

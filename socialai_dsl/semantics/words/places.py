@@ -1,0 +1,98 @@
+"""Words for sets of cells in which something is put, or of which the room is built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, cast
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.plans import Region, RegionName
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
+from socialai_dsl.semantics.scope import Scope
+from socialai_dsl.semantics.signatures import Signature
+from socialai_dsl.semantics.terms import SIDE, Const, Type
+from socialai_dsl.vocabulary import SIDES
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """The word of a place where it is written.
+
+    Attributes:
+        signature: the word. node: all of it, for messages. args: what is written in brackets.
+        index, count: whose place it is of a group of how many; None: nobody's, the room is built of it.
+    """
+
+    resolver: Resolver
+    signature: Signature
+    node: ast.Expr
+    args: tuple[ast.Expr, ...]
+    scope: Scope
+    index: int = 0
+    count: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place(Signature):
+    """A word for a set of cells; `meaning` is the regions that a use of it stands for."""
+
+    meaning: Callable[[Placed], tuple[Region, ...]]
+    use: str = "place"  # type: ignore[assignment]
+
+
+def _known(placed: Placed) -> tuple[Region, ...]:
+    """A region of numbers."""
+    args = tuple(placed.resolver.value(arg, INT, placed.scope) for arg in placed.args)
+    return (Region(cast(RegionName, placed.signature.name), args),)
+
+
+def _about(placed: Placed) -> tuple[Region, ...]:
+    """A region around something, or around each of a group."""
+    resolver, (node,), scope = placed.resolver, placed.args, placed.scope
+    name = cast(RegionName, placed.signature.name)
+    if groups.is_group(resolver, node, scope):
+        return tuple(Region(name, (each,)) for each in groups.group(resolver, node, None, scope).items)
+    return (Region(name, (resolver.value(node, ENTITY, scope),)),)
+
+
+def _wall(placed: Placed) -> tuple[Region, ...]:
+    side = placed.resolver.value(placed.args[0], SIDE, placed.scope)
+    return (Region("wall", side=SIDES[side.value]) if isinstance(side, Const) else Region("wall", (side,)),)
+
+
+def _each_wall(placed: Placed) -> tuple[Region, ...]:
+    """The wall of this member of the group: top, bottom, left, right in turn."""
+    resolver, node, args, scope = placed.resolver, placed.node, placed.args, placed.scope
+    margin = resolver.value(args[0], INT, scope) if args else Const(Type("int", 1, 1), 1)
+    if not isinstance(margin, Const) or margin.value < 1:
+        message = "`each_wall` takes a number, at least 1: cells from the corners"
+        raise resolver.fail("S211", message, node, scope)
+    if placed.count is None or not 2 <= placed.count <= len(SIDES):
+        message = "`each_wall` is for a group of two to four, one in each wall"
+        hint = "give `count: 4`; for one thing write `wall(top)`"
+        raise resolver.fail("S204", message, node, scope, hint=hint)
+    return (Region("wall", side=SIDES[placed.index], margin=margin.value),)
+
+
+def _half(name: str, doc: str) -> Place:
+    return Place(name, "none", (), "place", doc, meaning=_known)
+
+
+PLACES: Final = (
+    _half("anywhere", "all free cells of the room"),
+    Place("nowhere", "none", (), "place", "not in the room", meaning=lambda _: ()),
+    _half("left_half", "x < W // 2"),
+    _half("right_half", "x > W // 2"),
+    _half("top_half", "y < H // 2"),
+    _half("bottom_half", "y > H // 2"),
+    Place("column", "none", ("int",), "place", "the column x, without the walls", meaning=_known),
+    Place("row", "none", ("int",), "place", "the row y, without the walls", meaning=_known),
+    Place("rect", "none", ("int", "int", "int", "int"), "place", "from (x0, y0) to (x1, y1)", meaning=_known),
+    Place("next_to", "none", ("entities",), "place", "one cell away from x", meaning=_about),
+    Place("in_front_of", "none", ("entities",), "place", "the cell before x", meaning=_about),
+    Place("wall", "none", ("side",), "place", "in this wall, not in its corners", meaning=_wall),
+    Place("each_wall", "none", ("int",), "place", "one in each wall, n off the corners", optional=1,
+          meaning=_each_wall),
+)  # fmt: skip

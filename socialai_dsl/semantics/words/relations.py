@@ -1,0 +1,169 @@
+"""Words for how two things lie, look and belong to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final, cast
+
+from socialai_dsl.semantics import groups, hands
+from socialai_dsl.semantics.groups import check_points
+from socialai_dsl.semantics.resolver import ENTITY
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    CELL,
+    DIRECTION,
+    CellOf,
+    Compare,
+    FieldOf,
+    Measure,
+    Not,
+    RelationName,
+    Sees,
+    Term,
+    Test,
+    Type,
+    all_of,
+    any_of,
+    arithmetic,
+    entity,
+    equals,
+    number,
+)
+from socialai_dsl.semantics.words.use import Use, Value
+
+
+def _related(use: Use) -> Term:
+    """Whether a relation of the engine's own holds to an argument, or to any of it."""
+    subject = use.subject_or_candidate()
+    return use.each(0, lambda other: Test(cast(RelationName, use.signature.name), subject, other))
+
+
+def _related_bodies(use: Use) -> Term:
+    """One to something that can be turned to somewhere, which a cell is not."""
+    if groups.is_group(use.resolver, use.args[0], use.scope):
+        return _related(use)
+    subject = use.subject_or_candidate()
+    return Test(cast(RelationName, use.signature.name), subject, use.value(0, ENTITY))
+
+
+def _viewer(use: Use) -> Term:
+    """Who sees; things see nothing."""
+    viewer = use.about()
+    if viewer.type.high >= len(use.resolver.symbols.numbers):
+        raise use.fail("S211", f"only a member of the cast has a view: `agent.{use.signature.name}(...)`")
+    return viewer
+
+
+def _looks_at(use: Use) -> Term:
+    viewer = _viewer(use)
+    return use.each(0, lambda other: Test("looks_at", viewer, other))
+
+
+def _sees(use: Use) -> Term:
+    """`a.sees(x)`, `a.would_see(x, direction)`; of a group, any of it."""
+    viewer = _viewer(use)
+
+    def seen(other: Term) -> Term:
+        # After what is seen: picks are numbered in source order.
+        return Sees(viewer, other, use.value(1, DIRECTION) if len(use.args) > 1 else None)
+
+    return use.each(0, seen)
+
+
+def _joint_attention(use: Use) -> Term:
+    """`a.joint_attention(b, x)`: both look at x; without x, at the same object."""
+    subject, other = use.about(), use.value(0, ENTITY)
+    members = len(use.resolver.symbols.numbers)
+    if max(subject.type.high, other.type.high) >= members:
+        message = "only members of the cast attend to something together"
+        at = use.node if subject.type.high > other.type.high else use.args[0]
+        hint = "`a.joint_attention(b, x)` is whether a and b both look at x"
+        raise use.fail("S204", message, at, hint=hint)
+
+    def both_look(what: Term) -> Term:
+        return all_of([Test("looks_at", subject, what), Test("looks_at", other, what)])
+
+    if len(use.args) > 1:
+        return use.each(1, both_look)
+    return any_of(both_look(entity(each)) for each in range(members, use.resolver.symbols.entities))
+
+
+def _points_at(use: Use) -> Term:
+    """`n.points_at(x)`: the arm is straight and x lies that way, or it is at the cell of x."""
+    subject = use.about()
+    check_points(use.resolver, use.signature.name, subject, use.node, use.scope)
+
+    def pointed_at(other: Term) -> Term:
+        way = replace(Measure(DIRECTION, "dir_to", (subject, other)), type=Type("int", 0, 3))
+        arm = FieldOf(Type("int", 0, 4), subject, "pointing")
+        straight = all_of(
+            [Compare("==", arm, arithmetic("+", way, number(1))), Test("in_line", subject, other)]
+        )
+        at_it = Compare("==", FieldOf(CELL, subject, "pointing"), CellOf(CELL, other))
+        # The arm of an NPC that leaves the room stays as it was, but points at nothing.
+        is_there = equals(FieldOf(BOOL, subject, "gone"), 0)
+        return all_of([any_of([all_of([at_it, is_there]), straight]), Not(Test("at", subject, other))])
+
+    return use.each(0, pointed_at)
+
+
+def _carries(use: Use) -> Term:
+    return hands.carries(use.resolver, use.about(), use.args[0], use.node, use.scope)
+
+
+def _distance(use: Use) -> Term:
+    subject, other = use.about(), use.resolver.somewhere(use.args[0], use.scope)
+    (_, width), (_, height) = use.resolver.symbols.width, use.resolver.symbols.height
+    return Measure(Type("int", 0, width + height), "distance", (subject, other))
+
+
+def _direction(use: Use) -> Term:
+    subject = use.about()
+    return Measure(DIRECTION, "dir_to", (subject, use.resolver.somewhere(use.args[0], use.scope)))
+
+
+def _test(
+    name: RelationName,
+    doc: str,
+    *,
+    candidate: bool = False,
+    cell: bool = False,
+    also: tuple[str, ...] = (),
+    meaning: Callable[[Use], Term] = _related,
+) -> Value:
+    """A relation for which the engine has a test."""
+    return Value(
+        name, "entity", ("entities",), "condition", doc,
+        candidate=candidate, cell=cell, also=also, meaning=meaning,
+    )  # fmt: skip
+
+
+RELATIONS: Final = (
+    _test("at", "on the same cell", candidate=True, also=("reaches", "on", "in_cell")),
+    _test("next_to", "one cell away, whatever the facing", candidate=True,
+          also=("near", "close_to", "beside", "adjacent", "adjacent_to", "by")),
+    _test("in_front_of", "on the cell before x", candidate=True, meaning=_related_bodies),
+    _test("faces", "x is on the cell ahead"),
+    _test("faces_toward", "turned to where face(x) would end"),
+    Value("joint_attention", "member", ("entity", "entities"), "condition", "both look at x, or at the same object",
+          optional=1, meaning=_joint_attention),
+    Value("points_at", "member", ("entities",), "condition",
+          "it points at the cell of x, or the way x lies straight", also=("points_to",), meaning=_points_at),
+    _test("eye_contact", "same row or column, each turned to the other", meaning=_related_bodies),
+    _test("in_line", "same row or same column", cell=True),
+    _test("can_reach", "a free path to x, or next to x, exists now"),
+    _test("unobstructed", "in line with x and nothing opaque between", cell=True),
+    Value("looks_at", "member", ("entities",), "condition", "x is straight ahead in its view, nothing opaque between",
+          also=("looking_at",), meaning=_looks_at),
+    Value("sees", "member", ("entities",), "condition", "x is in its view square",
+          also=("can_see", "see"), meaning=_sees),
+    Value("would_see", "member", ("entities", "direction"), "condition", "x would be, if it faced this direction",
+          meaning=_sees),
+    Value("carries", "member", ("entities",), "condition", "x is in its hands", momentary=True,
+          also=("holds", "has", "holding"), meaning=_carries),
+    Value("distance", "entity", ("entity",), "number", "Manhattan distance", cell=True,
+          also=("dist", "distance_to"), meaning=_distance),
+    Value("dir_to", "entity", ("entity",), "direction", "the quadrant in which x lies", cell=True,
+          also=("toward",), meaning=_direction),
+)  # fmt: skip
