@@ -9,9 +9,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Final
+from typing import Final, TypedDict, Unpack
 
-from socialai_dsl.source import Source, Span
+from socialai_dsl.cures import Cure, Hint
+from socialai_dsl.source import Source, Span, TextEdit
 from socialai_dsl.vocabulary import composed
 
 CODES: Final[dict[str, str]] = {
@@ -123,7 +124,7 @@ class Diagnostic:
         span: where.
         severity: error or warning.
         hint: what to do about it, shown on a line of its own; None where the message says it.
-        suggestion: the word that was probably meant, shown as "did you mean `x`?".
+        suggestion: the word that was probably meant in the place of `span`, shown as "did you mean `x`?".
         suggestion_place: where that word is, e.g. "let, line 18" or "talkitout.yaml:43".
         notes: lines that say more, such as why it is so.
     """
@@ -132,7 +133,7 @@ class Diagnostic:
     message: str
     span: Span
     severity: Severity = Severity.ERROR
-    hint: str | None = None
+    hint: Hint = None
     suggestion: str | None = None
     suggestion_place: str | None = None
     notes: tuple[str, ...] = ()
@@ -146,9 +147,30 @@ class Diagnostic:
         quoted = self.suggestion if self.suggestion.startswith('"') else f"`{self.suggestion}`"
         return printable(f"{self.message}; did you mean {quoted}{place}?")
 
+    @property
+    def edits(self) -> tuple[TextEdit, ...]:
+        """The changes of files after which it is gone; none where only advice can be given."""
+        if isinstance(self.hint, Cure):
+            return self.hint.edits
+        return (TextEdit(self.span, self.suggestion),) if self.suggestion is not None else ()
+
+    @property
+    def cure(self) -> str:
+        """What its `edits` do, in words."""
+        title = self.hint.title if isinstance(self.hint, Cure) else ""
+        return title or f"write `{self.suggestion}`"
+
     def __str__(self) -> str:
         """`file:line:col: CODE message; did you mean ...?`, safe to print."""
         return f"{printable(str(self.span))}: {self.code} {self.text}"
+
+
+class Advice(TypedDict, total=False):
+    """What a finding says beside its message: attributes of the `Diagnostic`."""
+
+    hint: Hint
+    suggestion: str | None
+    suggestion_place: str | None
 
 
 class ScenarioError(Exception):
@@ -186,29 +208,13 @@ class DiagnosticBag:
         """Add several findings."""
         self._found.update(dict.fromkeys(diagnostics))
 
-    def error(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        hint: str | None = None,
-        suggestion: str | None = None,
-        suggestion_place: str | None = None,
-    ) -> None:
-        """Add an error, with the attributes of the `Diagnostic`."""
-        self.add(Diagnostic(code, message, span, Severity.ERROR, hint, suggestion, suggestion_place))
+    def error(self, code: str, message: str, span: Span, **advice: Unpack[Advice]) -> None:
+        """Add an error."""
+        self.add(Diagnostic(code, message, span, Severity.ERROR, **advice))
 
-    def warning(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        hint: str | None = None,
-        suggestion: str | None = None,
-        suggestion_place: str | None = None,
-    ) -> None:
-        """Add a warning, with the attributes of the `Diagnostic`."""
-        self.add(Diagnostic(code, message, span, Severity.WARNING, hint, suggestion, suggestion_place))
+    def warning(self, code: str, message: str, span: Span, **advice: Unpack[Advice]) -> None:
+        """Add a warning."""
+        self.add(Diagnostic(code, message, span, Severity.WARNING, **advice))
 
     @property
     def has_errors(self) -> bool:
@@ -264,7 +270,7 @@ def suggested(
     return otherwise if near is None else f"; did you mean {quoted(near)}?"
 
 
-def advice_on(word: str, known: Iterable[str], otherwise: str) -> dict[str, str | None]:
+def advice_on(word: str, known: Iterable[str], otherwise: str) -> Advice:
     """What the finding about an unknown word adds: the one that it is most likely a slip for, else a hint."""
     near = did_you_mean(word, known)
     return {"suggestion": near, "hint": None if near else otherwise}
@@ -302,7 +308,7 @@ def _fold(word: str) -> str:
 
 
 def _nearness(word: str, candidate: str) -> int | None:
-    """Edit distance, or None if it is above the cut-off."""
+    """TextEdit distance, or None if it is above the cut-off."""
     longer, shorter = max(len(word), len(candidate)), min(len(word), len(candidate))
     cut_off = (longer + 2) // 4
     distance = _edit_distance(word, candidate, cut_off) if longer - shorter <= cut_off else cut_off + 1
@@ -379,7 +385,7 @@ def _render_one(diagnostic: Diagnostic, source: Source | None, color: bool) -> s
         lines += _snippet(diagnostic.span, source, paint, reset)
     lines += [f"  {printable(note)}" for note in diagnostic.notes]
     if diagnostic.hint:
-        lines.append(f"  {cyan}help:{reset} {printable(diagnostic.hint)}")
+        lines.append(f"  {cyan}help:{reset} {printable(str(diagnostic.hint))}")
     return "\n".join(lines)
 
 
@@ -436,7 +442,7 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> list[dict[str, str | int | Non
             "severity": d.severity.value,
             "code": d.code,
             "message": d.text,
-            "hint": d.hint,
+            "hint": None if d.hint is None else str(d.hint),
         }
         for d in diagnostics
     ]

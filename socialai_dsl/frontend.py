@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple, NoReturn
 
+from socialai_dsl import cures
 from socialai_dsl.checking.curricula import check_curriculum
 from socialai_dsl.checking.experiments import (
     LoadedExperiment,
@@ -43,7 +44,7 @@ from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import Source, Span, Style
+from socialai_dsl.source import DataPath, Source, Span, Style
 
 __all__ = [
     "CheckResult",
@@ -120,9 +121,31 @@ def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str
             message = f"`{ignore.code}` is an error here, and only warnings can be ignored"
             bag.warning(UNUSED, message, ignore.span)
         elif ignore.span.file == judged and ignore.key not in silenced and ignore.code not in _OF_TRIALS:
-            message = f"nothing on this line is warned of with `{ignore.code}`; delete the comment"
-            bag.warning(UNUSED, message, ignore.span)
+            message = f"nothing on this line is warned of with `{ignore.code}`"
+            bag.warning(UNUSED, message, ignore.span, hint=_without(ignore, sources[ignore.span.file]))
     return SiftedFindings(tuple(bag), frozenset(i.span for i in ignores if i.key in silenced))
+
+
+def _without(ignore: Ignore, source: Source) -> cures.Hint:
+    """The proposal to delete a code from a comment, or all of the comment where it names no other."""
+    start = source.index(ignore.span)
+    end = start + len(ignore.code)
+    line_start = source.index(source.span(ignore.span.line, 1))
+    comment = next(found for found in _IGNORE.finditer(source.text, line_start) if found.end() >= end)
+    codes = _CODE.findall(comment["codes"] or "")
+    if len(codes) > 1:
+        last = codes[-1] == ignore.code
+        behind = re.compile(r"\s*,\s*").match(source.text, end)
+        before = re.compile(r"\s*,\s*$").search(source.text, line_start, start)
+        edges = (
+            (before.start() if before else start, end) if last or behind is None else (start, behind.end())
+        )
+        return cures.propose(f"delete `{ignore.code}`", source.edit(*edges, ""))
+    line_end = line_start + len(source.line(ignore.span.line))
+    start = line_start + len(source.text[line_start : comment.start()].rstrip())
+    if start == line_start:
+        line_end = min(line_end + 1, len(source.text))
+    return cures.propose("delete the comment", source.edit(start, line_end, ""))
 
 
 def not_ignored(found: Iterable[Diagnostic], sources: Mapping[str, Source]) -> Iterator[Diagnostic]:
@@ -193,7 +216,7 @@ def said_once(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
         if d.code not in _OF_ONE_NAME or not others:
             yield d
         elif d is first:
-            yield replace(d, hint="; ".join(filter(None, (d.hint, _repeated(d, others)))))
+            yield _everywhere(d, others)
 
 
 def _cause(found: Diagnostic) -> tuple[str, ...]:
@@ -202,6 +225,16 @@ def _cause(found: Diagnostic) -> tuple[str, ...]:
     if found.code == "S201" and found.suggestion is not None and word is not None:
         return found.code, word[0], found.suggestion
     return found.code, found.text
+
+
+def _everywhere(first: Diagnostic, others: Sequence[Diagnostic]) -> Diagnostic:
+    """A finding that says where else it is, and is cured there, too."""
+    hint = cures.noted(first.hint, _repeated(first, others))
+    if not first.edits:
+        return replace(first, hint=hint)
+    edits = tuple(dict.fromkeys(edit for one in (first, *others) for edit in one.edits))
+    whole = hint if isinstance(hint, cures.Cure) else cures.Cure("", (), str(hint))
+    return replace(first, hint=replace(whole, edits=edits))
 
 
 def _repeated(first: Diagnostic, others: Sequence[Diagnostic]) -> str:
@@ -230,7 +263,9 @@ def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
             continue
         place = span.value.shifted(comment.start(1) - span.start, len(comment[1]))
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
-        hint = f'write "{text} {comment[1]}" if it belongs to the text, else a blank behind the `#`'
+        whole = cures.in_quotes(node.source.text[span.start : comment.end(1)])
+        edit = node.source.edit(span.start, comment.end(1), whole)
+        hint = cures.write(whole, edit, "if it is a comment, write a blank behind the `#`")
         yield Diagnostic("W009", message, place, Severity.WARNING, hint)
 
 
@@ -543,17 +578,18 @@ def _check_played(
             what = _kind_of(result)
             bag.error("S108", f"this is {what}; only a scenario or a suite can be run", span)
             continue
-        _add_findings(result, span, experiment, bag, files)
+        _add_findings(result, place, experiment, bag, files)
     return played
 
 
 def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]) -> None:
     """Check the files of phases that an experiment names."""
     for path, place in experiment.curricula():
-        result, span = check(path), experiment.resolved.tree.value_span(place)
+        result = check(path)
         if result.has_errors:
-            _add_findings(result, span, experiment, bag, files)
+            _add_findings(result, place, experiment, bag, files)
         elif result.curriculum is None:
+            span = experiment.resolved.tree.value_span(place)
             bag.error("S108", f"this is {_kind_of(result)}; expected a curriculum", span)
 
 
@@ -568,7 +604,7 @@ def _check_scripts(
         try:
             closest = closest_script(from_anywhere(written, experiment.folder), played[written])
         except ScenarioError as error:
-            _add_findings(error, spans[0], experiment, bag, files)
+            _add_findings(error, places[0], experiment, bag, files)
             continue
         lacking = unscripted(closest.loaded)
         for span in spans if lacking else ():
@@ -578,12 +614,12 @@ def _check_scripts(
 
 def _add_findings(
     result: CheckResult | ScenarioError,
-    span: Span,
+    place: DataPath,
     experiment: LoadedExperiment,
     bag: DiagnosticBag,
     files: dict[str, Source],
 ) -> None:
-    """The errors of something that an experiment names at `span`: at their places, or at the name if it is wrong."""
+    """The errors of something that an experiment names at a place: at their own, or in the name if that is wrong."""
     files.update({source: text for source, text in result.sources.items() if source not in files})
     for finding in result.diagnostics:
         if finding.severity is not Severity.ERROR:
@@ -594,4 +630,11 @@ def _add_findings(
         meant = finding.suggestion
         if meant is not None and os.path.isabs(meant):
             meant = os.path.relpath(meant, experiment.folder)
-        bag.add(replace(finding, span=span, suggestion=meant))
+        # A path that is written from the experiment's folder may be longer or shorter than that from here.
+        name = experiment.resolved.tree.at(place)
+        asked = result.sources.get(finding.span.file)
+        longer = len(finding.span.file if asked is None else asked.text) - len(str(name.value))
+        offset, width = max(0, finding.span.column - 1 - longer), finding.span.width
+        if finding.span.column == 1:
+            offset, width = 0, width - longer
+        bag.add(replace(finding, span=name.locate((), offset, width), suggestion=meant))

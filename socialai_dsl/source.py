@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from bisect import bisect
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -35,6 +36,14 @@ class Span:
 
 
 @dataclass(frozen=True)
+class TextEdit:
+    """A change of a file: `text` takes the place of the characters of `span`, line breaks among them; of none if 0."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True)
 class Source:
     """A file's text under the name by which messages call it.
 
@@ -63,6 +72,30 @@ class Source:
     def span(self, line: int, column: int, width: int = 1) -> Span:
         """A place in this source."""
         return Span(self.name, line, column, width)
+
+    # -- edits -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        """Where each line begins."""
+        return [0, *(found.end() for found in _LINE_BREAK.finditer(self.text))]
+
+    def index(self, span: Span) -> int:
+        """Where a place in this source begins in its text."""
+        return self._starts[span.line - 1] + span.column - 1
+
+    def edit(self, start: int, end: int, text: str) -> TextEdit:
+        """The change that puts another text in the place of `self.text[start:end]`."""
+        line = bisect(self._starts, start)
+        return TextEdit(self.span(line, start - self._starts[line - 1] + 1, end - start), text)
+
+    def edited(self, edits: Iterable[TextEdit]) -> str:
+        """The text after changes that do not overlap."""
+        text = self.text
+        for edit in sorted(edits, key=lambda edit: edit.span, reverse=True):
+            start = self.index(edit.span)
+            text = text[:start] + edit.text + text[start + edit.span.width :]
+        return text
 
 
 DataPath: TypeAlias = tuple[str | int, ...]
@@ -181,7 +214,7 @@ class NodeSpan:
         style: how the value is written.
         flow: whether the value stands inside `{ }` or `[ ]`.
         start: index in the source's text of a scalar's first character, quotes and block header included.
-        end: index behind its last character.
+        end: index behind its last character; of a mapping or list only if it is written in braces or brackets.
         read: what a scalar was read as.
     """
 
@@ -204,7 +237,9 @@ class NodeSpan:
             return self.value.shifted(min(max(offset, 0), len(raw)), width)
         assert isinstance(self.read, str), "internal: what is written as a text is read as one"
         indices = source_indices(text, self.start, self.end, self.style, self.read)
-        before = Source("", text[self.start : indices[min(max(offset, 0), len(indices) - 1)]])
+        index, end = (indices[min(max(place, 0), len(indices) - 1)] for place in (offset, offset + width))
+        width = max(width, end - index) if _LINE_BREAK.search(text, index, end) is None else width
+        before = Source("", text[self.start : index])
         *_, (breaks, last) = enumerate(before.lines())
         column = len(last) + (1 if breaks else self.value.column)
         return Span(self.value.file, self.value.line + breaks, column, width)
@@ -334,10 +369,31 @@ class Node:
         """The place of the value at a path."""
         return self.nearest(path).span.value
 
+    def whole_span(self, path: DataPath = ()) -> Span:
+        """The place of all that is written of the value at a path, which may be several lines."""
+        part = self.nearest(path)
+        return Span(
+            part.file, part.span.value.line, part.span.value.column, max(1, part.end - part.span.start)
+        )
+
     def key_span(self, path: DataPath = ()) -> Span:
         """The place of the key at a path; of the value, for an item of a list and for the root."""
         span = self.nearest(path).span
         return span.key or span.value
+
+    @property
+    def is_braced(self) -> bool:
+        """Whether it is a mapping or list in braces or brackets."""
+        return self.children is not None and self.source.text[self.span.start : self.span.start + 1] in "{["
+
+    @property
+    def end(self) -> int:
+        """The index behind what is written of it in its file."""
+        if isinstance(self.children, dict) and self.children and not self.is_braced:
+            return list(self.children.values())[-1].end
+        if isinstance(self.children, list) and self.children and not self.is_braced:
+            return self.children[-1].end
+        return self.span.start + len(self.source.text[self.span.start : self.span.end].rstrip())
 
     # -- changes ---------------------------------------------------------------------------------------------
 

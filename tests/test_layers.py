@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[1]
 
 TEXT_SIDE = {
     "source",
+    "cures",
     "diagnostics",
     "draws",
     "vocabulary",
@@ -46,16 +47,20 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "runs.versions": (set(), set()),
     "runs.folder": ({"atomic", "errors", "runs.lock", "runs.status"}, {"pydantic", CONFIG, FILES}),
     "source": (set(), set()),
-    "diagnostics": ({"source", "vocabulary"}, set()),
+    "cures": ({"source"}, set()),
+    "diagnostics": ({"source", "cures", "vocabulary"}, set()),
     "draws": (set(), {"numpy", "numba"}),
     "vocabulary": (set(), set()),
     "widths": (set(), set()),
     "grammar": ({"source", "diagnostics", "vocabulary", "widths"}, {"lark"}),
     "schema": (
-        {"source", "diagnostics", "errors", "vocabulary", "grammar"},
+        {"source", "cures", "diagnostics", "errors", "vocabulary", "grammar"},
         {"pydantic", "pydantic_core", CONFIG},
     ),
-    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "widths", "grammar", "schema"}, set()),
+    "semantics": (
+        {"source", "cures", "diagnostics", "draws", "vocabulary", "widths", "grammar", "schema"},
+        set(),
+    ),
     "loader": (
         TEXT_SIDE - {"frontend", "checking", "library"} | {"errors"},
         {"yaml", "pydantic", "pydantic_core"},

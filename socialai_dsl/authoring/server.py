@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +17,7 @@ from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile
-from socialai_dsl.source import Node, Source, Span
+from socialai_dsl.source import Node, Source, Span, TextEdit
 
 _SEVERITIES: Final = {
     Severity.ERROR: lsp.DiagnosticSeverity.Error,
@@ -38,6 +38,7 @@ class Server(LanguageServer):
     def __init__(self) -> None:
         super().__init__("socialai", version("socialai-dsl"))
         self._resolved: dict[str, ResolvedFile] = {}
+        self._cures: dict[str, list[lsp.CodeAction]] = {}
 
     # -- findings ----------------------------------------------------------------------------------------------
 
@@ -49,6 +50,7 @@ class Server(LanguageServer):
     def forget(self, uri: str) -> None:
         """Take the findings of a file back that is closed."""
         self._resolved.pop(uri, None)
+        self._cures.pop(uri, None)
         self._publish(uri, [])
 
     def _publish(self, uri: str, found: list[lsp.Diagnostic]) -> None:
@@ -60,7 +62,13 @@ class Server(LanguageServer):
         result = frontend.check(path, texts)
         if (whole := result.whole) is not None:
             self._resolved[uri] = whole
-        return [self._finding(uri, d, display_name(path)) for d in result.diagnostics]
+        found = [self._finding(uri, d, display_name(path)) for d in result.diagnostics]
+        self._cures[uri] = [
+            self._cure(d, shown, result.sources)
+            for d, shown in zip(result.diagnostics, found, strict=True)
+            if d.edits
+        ]
+        return found
 
     def _finding(self, uri: str, found: Diagnostic, own: str) -> lsp.Diagnostic:
         message = found.text if found.hint is None else f"{found.text}\n{found.hint}"
@@ -74,6 +82,43 @@ class Server(LanguageServer):
             code=found.code,
             source="socialai",
         )
+
+    def _cure(
+        self, found: Diagnostic, shown: lsp.Diagnostic, sources: Mapping[str, Source]
+    ) -> lsp.CodeAction:
+        changes: dict[str, list[lsp.TextEdit]] = {}
+        for edit in found.edits:
+            source = sources[edit.span.file]
+            assert source.path is not None, "internal: what is to be changed is a file"
+            uri = next(
+                (uri for uri in self.workspace.text_documents if path_of(uri) == source.path),
+                from_fs_path(str(source.path)) or "",
+            )
+            changes.setdefault(uri, []).append(lsp.TextEdit(self._range_of(edit, source), edit.text))
+        title = found.cure[0].upper() + found.cure[1:]
+        return lsp.CodeAction(
+            title=title,
+            kind=lsp.CodeActionKind.QuickFix,
+            diagnostics=[shown],
+            edit=lsp.WorkspaceEdit(changes=changes),
+        )
+
+    def _range_of(self, edit: TextEdit, source: Source) -> lsp.Range:
+        """The place of a change, which may be several lines, as the editor counts."""
+        codec, lines = self.workspace.position_codec, [line + "\n" for line in source.lines()]
+        start = source.index(edit.span)
+        first, behind = (source.edit(index, index, "").span for index in (start, start + edit.span.width))
+        places = (lsp.Position(span.line - 1, span.column - 1) for span in (first, behind))
+        return lsp.Range(*(codec.position_to_client_units(lines, place) for place in places))
+
+    def cures(self, uri: str, wanted: lsp.Range) -> list[lsp.CodeAction]:
+        """The cures of what is found in a range of a file."""
+        return [
+            cure
+            for cure in self._cures.get(uri, [])
+            for shown in cure.diagnostics or ()
+            if shown.range.start <= wanted.end and wanted.start <= shown.range.end
+        ]
 
     # -- the file that is asked about --------------------------------------------------------------------------
 
@@ -143,6 +188,9 @@ def make_server() -> Server:
         lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[".", "$", "(", "<", " "])
     )(completion)
     server.feature(lsp.TEXT_DOCUMENT_FORMATTING)(formatting)
+    server.feature(
+        lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix])
+    )(cures)
     return server
 
 
@@ -202,6 +250,11 @@ def _items(offers: Iterable[assist.Offer]) -> Iterable[lsp.CompletionItem]:
             insert_text=insert,
             sort_text=f"{number:04}",
         )
+
+
+def cures(ls: Server, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+    """The changes that the findings at the cursor propose."""
+    return ls.cures(params.text_document.uri, params.range)
 
 
 def formatting(ls: Server, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit] | None:

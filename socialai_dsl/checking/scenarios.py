@@ -7,6 +7,7 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import (
     Diagnostic,
     DiagnosticBag,
@@ -53,7 +54,8 @@ def put_parameters(
         elif name not in declared:  # without a default, it is reported where it is declared
             near = did_you_mean(name, values)
             span = node.locate(width=len(name) + 1)
-            bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
+            suggestion = f"${near}" if near else None
+            bag.error("S206", f"unknown parameter `{name}`", span, suggestion=suggestion)
 
 
 def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Value]:
@@ -74,7 +76,7 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
         if name not in declared:
             advice = advice_on(name, declared, "it has " + ", ".join(declared) if declared else "it has none")
             message = f"`{resolved.name}` has no parameter `{name}`"
-            bag.error("S206", message, resolved.param_span(name), **advice)
+            bag.error("S206", message, resolved.param_name_span(name), **advice)
     return values
 
 
@@ -206,8 +208,14 @@ def _keep_one_frame(name: str, member: Node, keys: dict[str, Node], bag: Diagnos
             hint = "join them in one frame, or let two members follow them"
             bag.error("S313", message, given.children[1].value_span(), hint=hint)
         else:
-            hint = f"write `frame: {words[0]}`" if words else "leave it out: without a frame it stays"
-            bag.error("S104", "`frame` names one frame, here is a list", given.value_span(), hint=hint)
+            cure = (
+                cures.write(f"frame: {words[0]}", cures.over_value(given, (), words[0]))
+                if words
+                else cures.propose(
+                    "leave it out", cures.deleted(member, (key,)), also="without a frame it stays"
+                )
+            )
+            bag.error("S104", "`frame` names one frame, here is a list", given.value_span(), hint=cure)
         del keys[key]
         if words:
             given.put(words[0])
@@ -468,7 +476,7 @@ def naming_the_patch(finding: Diagnostic, resolved: ResolvedFile) -> Diagnostic:
     )
     patches = {f"{e.span.file}:{e.span.line}" for e in edits} or {e.span.file for e in resolved.edits}
     note = f"in `{resolved.name}`, patched by {', '.join(sorted(patches))}"
-    return replace(finding, hint=f"{finding.hint}; {note}" if finding.hint else note)
+    return replace(finding, hint=cures.noted(finding.hint, note))
 
 
 MOST_CHOICES: Final = 64
@@ -491,7 +499,7 @@ def of_other_values(resolved: ResolvedFile) -> Iterator[Diagnostic]:
             if found.severity is Severity.ERROR and found not in said:
                 said.add(found)
                 note = f"with `{resolved.name}?{name}={text}`"
-                yield replace(found, hint=f"{found.hint}; {note}" if found.hint else note)
+                yield replace(found, hint=cures.noted(found.hint, note))
 
 
 def _others(resolved: ResolvedFile) -> Iterator[tuple[str, str]]:

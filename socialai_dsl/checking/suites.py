@@ -185,7 +185,7 @@ def _check_parameters(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
         if name != "split":
             hint = "only `?split=NAME`; members get theirs in the file: `dance.yaml?length=2`"
             message = f"`{resolved.name}` is a suite and has no parameter `{name}`"
-            bag.error("S206", message, resolved.param_span(name), **advice_on(name, ["split"], hint))
+            bag.error("S206", message, resolved.param_name_span(name), **advice_on(name, ["split"], hint))
 
 
 def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> None:

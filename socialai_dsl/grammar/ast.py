@@ -7,12 +7,12 @@ always the leftmost character of the node), so a loader can turn it into file:li
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal, NamedTuple, TypeVar
 
 from lark import Lark, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, VisitError
@@ -90,9 +90,15 @@ def _names(kind: type) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Node:
-    """A piece of an expression."""
+    """A piece of an expression.
+
+    Attributes:
+        at: where it begins in what was parsed; of a text, behind its quotation mark.
+        end: where it ends, a text with its quotation mark.
+    """
 
     at: int = 0
+    end: int = 0
 
     def children(self) -> Iterator[Expr]:
         """The sub-expressions in source order."""
@@ -294,7 +300,7 @@ def options_of(node: Expr) -> tuple[Expr, ...]:
 def moved(node: Expr, place: Callable[[int], int]) -> Expr:
     """The same tree with every offset changed."""
     offsets: dict[str, Any] = {
-        name: place(getattr(node, name)) for name in ("at", "name_at") if hasattr(node, name)
+        name: place(getattr(node, name)) for name in ("at", "end", "name_at") if hasattr(node, name)
     }
     found: Expr = replace(rebuilt(node, lambda part: moved(part, place)), **offsets)
     return found
@@ -307,18 +313,49 @@ MAX_LENGTH = 500
 MAX_DEPTH = 24
 
 
+class Instead(NamedTuple):
+    """A text that is to stand in the place of the characters `start` to `end` of what was parsed."""
+
+    start: int
+    end: int
+    text: str
+
+
 class ParseProblem(Exception):  # noqa: N818 - a finding on its way to a diagnostic, not a failure
     """A mistake in a string of the language: a code of the catalogue, a message and a place.
 
-    Attributes: code, message, offset (0-based, into the parsed string), hint (or None), words (several that stand
-    side by side and may be a text; or None).
+    Attributes:
+        code, message: of the finding.
+        offset: 0-based, into the parsed string.
+        hint: advice, or why `instead` is proposed; or None.
+        words: several that stand side by side and may be a text; or None.
+        instead: what is to be written in the place of some characters; or None.
     """
 
     def __init__(
-        self, code: str, message: str, offset: int, hint: str | None = None, words: str | None = None
+        self,
+        code: str,
+        message: str,
+        offset: int,
+        hint: str | None = None,
+        words: str | None = None,
+        instead: Instead | None = None,
     ) -> None:
         super().__init__(message)
         self.code, self.message, self.offset, self.hint, self.words = code, message, offset, hint, words
+        self.instead = instead
+
+    def __str__(self) -> str:
+        """The message and what is proposed, on one line."""
+        proposed = f"write `{self.instead.text.strip()}`" if self.instead is not None else self.hint
+        return f"{self.message}: {proposed}" if proposed else self.message
+
+    def moved(self, by: int) -> ParseProblem:
+        """The same in a longer string, of which this one begins at an offset."""
+        instead = self.instead
+        if instead is not None:
+            instead = Instead(instead.start + by, instead.end + by, instead.text)
+        return ParseProblem(self.code, self.message, self.offset + by, self.hint, self.words, instead)
 
 
 @lru_cache(maxsize=4096)
@@ -398,7 +435,7 @@ def _parse_slot(inner: str, offset: int) -> Expr:
     try:
         return moved(parse_expression(inner), lambda at: at + offset)
     except ParseProblem as problem:
-        raise ParseProblem(problem.code, problem.message, problem.offset + offset, problem.hint) from None
+        raise problem.moved(offset) from None
 
 
 @cache
@@ -417,34 +454,35 @@ _CITED = 12
 class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
     """Builds our nodes from lark's tree, bottom-up, so no recursion depends on the input."""
 
-    def _made(self, node: Any) -> Any:
+    def _made(self, meta: Any, node: Any) -> Any:
         depth = 1 + max((_depth_of(child) for child in node.children()), default=0)
         if depth > MAX_DEPTH:
-            raise ParseProblem("S004", f"an expression may be nested {MAX_DEPTH} deep", node.at)
-        return node
+            raise ParseProblem("S004", f"an expression may be nested {MAX_DEPTH} deep", meta.start_pos)
+        return replace(node, at=meta.start_pos, end=meta.end_pos)
 
     def number(self, meta: Any, items: list[Any]) -> Any:
         if len(items[0]) > _DIGITS or int(items[0]) > LARGEST_NUMBER:
             cited = items[0] if len(items[0]) <= _CITED else f"{items[0][:_CITED]}..."
             message = f"the number {cited} is too large; numbers go up to {LARGEST_NUMBER:,}"
             raise ParseProblem("S004", message, meta.start_pos)
-        return self._made(Number(int(items[0]), at=meta.start_pos))
+        return self._made(meta, Number(int(items[0])))
 
     def text(self, meta: Any, items: list[Any]) -> Any:
         inner = parse_text(str(items[0])[1:-1])
-        return self._made(moved(inner, lambda at: at + meta.start_pos + 1))
+        made = self._made(meta, moved(inner, lambda at: at + meta.start_pos + 1))
+        return replace(made, at=meta.start_pos + 1)
 
     def yes(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Truth(True, at=meta.start_pos))
+        return self._made(meta, Truth(True))
 
     def no(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Truth(False, at=meta.start_pos))
+        return self._made(meta, Truth(False))
 
     def parameter(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Parameter(str(items[0]), at=meta.start_pos))
+        return self._made(meta, Parameter(str(items[0])))
 
     def name(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Name(str(items[0]), at=meta.start_pos))
+        return self._made(meta, Name(str(items[0])))
 
     def binder(self, meta: Any, items: list[Any]) -> Any:
         return tuple(items)
@@ -454,57 +492,58 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
 
     def quantifier(self, meta: Any, items: list[Any]) -> Any:
         name, (var, group, where, to) = items
-        return self._made(Quantifier(str(name), str(var), group, where, to, at=meta.start_pos))
+        return self._made(meta, Quantifier(str(name), str(var), group, where, to))
 
     def call(self, meta: Any, items: list[Any]) -> Any:
         name, args = items
-        return self._made(Call(str(name), args or (), None, name.start_pos, at=meta.start_pos))
+        return self._made(meta, Call(str(name), args or (), None, name.start_pos))
 
     def verb(self, meta: Any, items: list[Any]) -> Any:
         subject, name, args = items
-        return self._made(Call(str(name), args or (), subject, name.start_pos, at=meta.start_pos))
+        return self._made(meta, Call(str(name), args or (), subject, name.start_pos))
 
     def attribute(self, meta: Any, items: list[Any]) -> Any:
         subject, name = items
-        return self._made(Attribute(subject, str(name), name.start_pos, at=meta.start_pos))
+        return self._made(meta, Attribute(subject, str(name), name.start_pos))
 
     def negative(self, meta: Any, items: list[Any]) -> Any:
         if items[0] != "-":
-            raise ParseProblem("S203", "a leading `+` is not needed", meta.start_pos)
-        return self._made(Negative(items[1], at=meta.start_pos))
+            sign = Instead(meta.start_pos, meta.start_pos + 1, "")
+            raise ParseProblem("S203", "a leading `+` is not needed", meta.start_pos, instead=sign)
+        return self._made(meta, Negative(items[1]))
 
     def arithmetic(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Arithmetic(str(items[1]), items[0], items[2], at=meta.start_pos))
+        return self._made(meta, Arithmetic(str(items[1]), items[0], items[2]))
 
     def interval(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Interval(*items, at=meta.start_pos))
+        return self._made(meta, Interval(*items))
 
     def alternatives(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Alternatives(tuple(items), at=meta.start_pos))
+        return self._made(meta, Alternatives(tuple(items)))
 
     def comparison(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Compare(str(items[1]), items[0], items[2], at=meta.start_pos))
+        return self._made(meta, Compare(str(items[1]), items[0], items[2]))
 
     def membership(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Member(items[0], items[1], at=meta.start_pos))
+        return self._made(meta, Member(items[0], items[1]))
 
     def exclusion(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Member(items[0], items[1], True, at=meta.start_pos))
+        return self._made(meta, Member(items[0], items[1], True))
 
     def negation(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Not(items[0], at=meta.start_pos))
+        return self._made(meta, Not(items[0]))
 
     def all_of(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Logic("and", tuple(items), at=meta.start_pos))
+        return self._made(meta, Logic("and", tuple(items)))
 
     def any_of(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Logic("or", tuple(items), at=meta.start_pos))
+        return self._made(meta, Logic("or", tuple(items)))
 
     def conditional(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(Conditional(*items, at=meta.start_pos))
+        return self._made(meta, Conditional(*items))
 
     def placed(self, meta: Any, items: list[Any]) -> Any:
-        return self._made(FilteredRegion(*items, at=meta.start_pos))
+        return self._made(meta, FilteredRegion(*items))
 
 
 def _depth_of(node: Expr) -> int:
@@ -515,18 +554,23 @@ def _depth_of(node: Expr) -> int:
 _CONDITIONAL = "`a if condition else b`"
 
 _SYMBOLS = {
-    "&&": "write `and`",
-    "&": "write `and`",
-    "||": "write `or`",
-    "!": "write `not`",
-    "=": "to compare write `==`",
-    "/": "division is written `//`",
+    "&&": "and",
+    "&": "and",
+    "||": "or",
+    "!": "not ",
+    "=": "==",
+    "/": "//",
+}
+"""Symbols of other languages, and what is written instead."""
+
+_OTHER_SYMBOLS = {
     "'": 'a text is quoted with "',
     "{": "a slot is written <name>",
     "[": "alternatives are written a | b",
     ";": "one expression at a time",
     "?": f"a value that depends is written {_CONDITIONAL}",
 }
+"""Those in whose place nothing can be written."""
 
 
 def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
@@ -538,21 +582,23 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         isinstance(error, UnexpectedToken) and error.token.type == "$END"
     ):
         if isinstance(error, UnexpectedToken) and "ELSE" in error.expected:
-            return ParseProblem("S210", f"`if` without `else`: write {_CONDITIONAL}", len(text))
+            cure = f"a value that depends is written {_CONDITIONAL}"
+            return ParseProblem("S210", "`if` without `else`", len(text), cure)
         return ParseProblem(
             "S210", "the expression ends too early: something is missing at its end", len(text)
         )
     assert isinstance(error, UnexpectedToken), "internal: an unknown kind of lark error"
     token, offset = error.token, error.token.start_pos or 0
     if token.type == "CMP" and "CMP" not in error.expected:
-        return ParseProblem("S207", f"comparisons do not chain: write `{_unchained(text, offset)}`", offset)
+        return ParseProblem("S207", "comparisons do not chain", offset, instead=_unchained(text, offset))
     if text.startswith("||", offset - 1):
         return _wrong_symbol(text, offset - 1)
     if token.type == "WHERE":
         return ParseProblem("S210", "`where` belongs in a place or inside pick(d in group where ...)", offset)
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
-    hint = words = None
+    hint: str | None = None
+    words = None
     if token.type in ("IF", "ELSE"):
         hint = f"a value that depends is written {_CONDITIONAL}"
     if token.type == "NAME":
@@ -573,7 +619,7 @@ _COMPARES = frozenset({"==", "!=", "<=", ">=", "<", ">"})
 _BOUNDS = frozenset({"and", "or", "not", "where", "to", "if", "else", ","})
 
 
-def _unchained(text: str, offset: int) -> str:
+def _unchained(text: str, offset: int) -> Instead:
     """`a < b and b < c` for the chain `a < b < c` whose second comparison stands at `offset`."""
     pieces = [(found.start(), found.group()) for found in _WORDS.finditer(text)]
     second = next(i for i, (start, _) in enumerate(pieces) if start == offset)
@@ -585,7 +631,16 @@ def _unchained(text: str, offset: int) -> str:
         return " ".join("".join(piece for _, piece in pieces[begin:end]).split())
 
     shared = words(first + 1, second)
-    return f"{words(left + 1, second)} and {shared} {words(second, right)}"
+    # Blanks around the comparisons stay where they are.
+    chain = text[_start(text, pieces, left + 1) : _start(text, pieces, right)]
+    start = _start(text, pieces, left + 1) + len(chain) - len(chain.lstrip())
+    unchained = f"{words(left + 1, second)} and {shared} {words(second, right)}"
+    return Instead(start, start + len(chain.strip()), unchained)
+
+
+def _start(text: str, pieces: Sequence[tuple[int, str]], number: int) -> int:
+    """Where a piece begins, or the text ends."""
+    return pieces[number][0] if number < len(pieces) else len(text)
 
 
 def _same_level(pieces: list[tuple[int, str]], start: int, step: int, ends: frozenset[str]) -> int:
@@ -610,11 +665,14 @@ def _wrong_symbol(text: str, offset: int) -> ParseProblem:
     if numbered is not None:
         letter = "o" if numbered["group"] == "d" else "d"
         found = f"first({letter} in {numbered['group']} where {letter}.index == {numbered['index']})"
-        cure = f"one of a group is found by `{found}`"
-        return ParseProblem("S203", f"`[` is not used here: {cure}", offset, cure)
-    for symbol, cure in _SYMBOLS.items():
+        return ParseProblem("S203", "`[` is not used here", offset, instead=Instead(*numbered.span(), found))
+    for symbol, meant in _SYMBOLS.items():
         if text.startswith(symbol, offset):
-            return ParseProblem("S203", f"`{symbol}` is not used here: {cure}", offset, cure)
+            instead = Instead(offset, offset + len(symbol), meant)
+            return ParseProblem("S203", f"`{symbol}` is not used here", offset, instead=instead)
+    for symbol, hint in _OTHER_SYMBOLS.items():
+        if text.startswith(symbol, offset):
+            return ParseProblem("S203", f"`{symbol}` is not used here", offset, hint)
     return ParseProblem("S203", f"`{text[offset]}` means nothing here", offset)
 
 

@@ -14,9 +14,10 @@ from typing import IO, Any, Final, NamedTuple
 
 import yaml
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style
+from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style, TextEdit
 
 MAX_FILE_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 32
@@ -169,8 +170,8 @@ def checked(source: Source) -> Source:
 
 def forbidden_character(character: str, span: Span) -> Diagnostic:
     """The finding for a character that no text may hold."""
-    message = f"the invisible character U+{ord(character):04X} may not be used; delete it"
-    return Diagnostic("S006", message, span)
+    message = f"the invisible character U+{ord(character):04X} may not be used"
+    return Diagnostic("S006", message, span, hint=cures.propose("delete it", TextEdit(span, "")))
 
 
 class Plain(NamedTuple):
@@ -179,7 +180,8 @@ class Plain(NamedTuple):
     value: Scalar
     code: str | None = None
     message: str = ""
-    hint: str | None = None
+    instead: str | None = None
+    also: str = ""
 
 
 _INT: Final = re.compile(r"[-+]?(0|[1-9][0-9]*)")
@@ -240,22 +242,29 @@ def _ambiguous(text: str) -> Plain | None:
     folded = text.lower()
     if folded in _TRUE | _FALSE and text in (folded, folded.capitalize(), folded.upper()):
         truth = "true" if folded in _TRUE else "false"
-        return _refused(text, f"`{truth}` for some YAML tools and text for others", f"write `{truth}`")
+        return _refused(text, f"`{truth}` for some YAML tools and text for others", truth)
     if text == "~" or folded == "null":
-        return _refused(text, "nothing for some YAML tools and text for others", "leave the value out")
+        return _refused(
+            text, "nothing for some YAML tools and text for others", otherwise="leave the value out"
+        )
     if text in ("=", "<<"):
         return _refused(text, "a special word for some YAML tools")
     if _NUMBER_LIKE.fullmatch(text):
-        return _refused(text, "not the same number for all YAML tools", "write a plain decimal number")
+        digits = re.fullmatch("([-+]?)0+([1-9][0-9]*)", text)
+        plain = digits[1].strip("+") + digits[2] if digits is not None else None
+        return _refused(
+            text, "not the same number for all YAML tools", plain, otherwise="write a plain decimal number"
+        )
     if _DATE.fullmatch(text):
         return _refused(text, "a date for some YAML tools and text for others")
     return None
 
 
-def _refused(text: str, reading: str, otherwise: str | None = None) -> Plain:
-    hint = f'if you mean the text, quote it: "{text}"'
-    hint = f"{otherwise}; {hint}" if otherwise else hint
-    return Plain(text, "S003", f"`{text}` is {reading}", hint)
+def _refused(text: str, reading: str, instead: str | None = None, otherwise: str | None = None) -> Plain:
+    also = f'if you mean the text, quote it: "{text}"'
+    if instead is None and otherwise is not None:
+        also = f"{otherwise}; {also}"
+    return Plain(text, "S003", f"`{text}` is {reading}", instead, also)
 
 
 _TEXTS: Final = frozenset(
@@ -389,6 +398,7 @@ class _LimitError(Exception):
 class _Frame:
     """A mapping or list that is being filled."""
 
+    node: Node
     container: dict[str, Node] | list[Node]
     path: DataPath
     flow: bool
@@ -448,7 +458,7 @@ class _Builder:
         width = end.column - start.column if end.line == start.line else 1
         return Span(self.source.name, start.line + 1, start.column + 1, max(1, width))
 
-    def _error(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
+    def _error(self, code: str, message: str, span: Span, hint: cures.Hint = None) -> None:
         self.found.add(Diagnostic(code, message, span, hint=hint))
 
     def _stop(self, message: str, span: Span) -> None:
@@ -507,7 +517,13 @@ class _Builder:
             return
         plain = read_plain(text)
         if plain.code:
-            self._error(plain.code, plain.message, self._span(event), plain.hint)
+            place = self.source.edit(event.start_mark.index, event.end_mark.index, plain.instead or "")
+            hint = (
+                cures.write(plain.instead, place, plain.also)
+                if plain.instead is not None
+                else plain.also or None
+            )
+            self._error(plain.code, plain.message, self._span(event), hint)
         self._value(plain.value, event, style)
 
     def _key(self, text: str, style: Style, span: Span) -> None:
@@ -576,10 +592,12 @@ class _Builder:
         path, node = self._path(), self._node(self._start(event), event, style)
         node.children = container
         self._put(node)
-        self._stack.append(_Frame(container, path, bool(event.flow_style), is_key))
+        self._stack.append(_Frame(node, container, path, bool(event.flow_style), is_key))
 
     def _end(self, event: Any) -> None:
         closed = self._stack.pop()
+        if closed.flow:
+            closed.node.span = replace(closed.node.span, end=event.end_mark.index)
         if closed.is_key:
             self._stack[-1].key = ""
 

@@ -105,7 +105,7 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
         elif key in params:
             found.add(Diagnostic("S508", f"the parameter `{key}` is given twice", piece.span))
         else:
-            params[key] = NamePart(value, piece.span)
+            params[key] = NamePart(value, piece.span.shifted(len(key) + 1, max(1, len(value))))
     return ScenarioName(_part(text, 0, plus, start), variants, params)
 
 
@@ -537,8 +537,12 @@ class ResolvedFile:
         return ResolvedFile(self._library, build, self._given)
 
     def param_span(self, name: str) -> Span:
-        """Where the parameter was given a value, in the name of the scenario."""
+        """The value that the parameter was given, in the name of the scenario."""
         return self._given[name].span
+
+    def param_name_span(self, name: str) -> Span:
+        """The parameter before the value that it was given, in the name of the scenario."""
+        return self._given[name].span.shifted(-len(name) - 1, len(name))
 
     def include(self, path: DataPath) -> ResolvedFile:
         """The scenario or npc that the text at `path` names, relative to the file that text stands in.
@@ -759,7 +763,7 @@ def _named_file(part: NamePart, folder: Path, source: Source, texts: Mapping[Pat
         # `did_you_mean` compares the first names only, so the likeliest come first.
         names = sorted(yaml_files(folder / head), key=lambda name: abs(len(head + name) - len(text)))
         near = did_you_mean(text, [head + name for name in names])
-        found.error("S007", "there is no such file", Span(text, 1, 1), suggestion=near)
+        found.error("S007", "there is no such file", Span(text, 1, 1, len(text)), suggestion=near)
     else:
         near = did_you_mean(text, [*shipped_names(), *names_in(folder)])
         hint = None if near else "a file is given by its path; shipped are " + ", ".join(shipped_names())

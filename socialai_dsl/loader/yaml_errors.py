@@ -6,8 +6,9 @@ import re
 from dataclasses import dataclass
 from typing import Any, Final
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.source import Source
+from socialai_dsl.source import Source, TextEdit
 
 _TEXT_QUOTES: Final = {"'": "'", '"': '"'}
 _COLON_IN_TEXT: Final = "not YAML: a colon followed by a space starts a new key; quote the text"
@@ -66,10 +67,15 @@ class _Place:
         match = re.match(r"(?:- )?([\w.]+):([^\s:].*)", self.line[self.column - 1 :])
         if not match:
             return None
-        hint = f"write `{match[1]}: {match[2]}`"
-        return self.finding("not YAML: a space is missing after the colon", hint)
+        text = f"{match[1]}: {match[2]}"
+        place = self.source.span(
+            self.line_number, self.column + match.start(1), len(match[0]) - match.start(1)
+        )
+        return self.finding(
+            "not YAML: a space is missing after the colon", cures.write(text, TextEdit(place, text))
+        )
 
-    def finding(self, message: str, hint: str | None = None) -> Diagnostic:
+    def finding(self, message: str, hint: cures.Hint = None) -> Diagnostic:
         return Diagnostic("S001", message, self.source.span(self.line_number, self.column), hint=hint)
 
 
@@ -139,7 +145,22 @@ def _colon(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
         )
     if not place.before.strip(" -{,"):
         return place.finding("not YAML: there is no key before this colon")
-    return place.finding(_COLON_IN_TEXT)
+    return place.finding(_COLON_IN_TEXT, _in_quotes(place))
+
+
+def _in_quotes(place: _Place) -> cures.Hint:
+    """The proposal to quote the text that a colon stands in, as far as one line shows where it begins and ends."""
+    keys = list(re.finditer(r"(?:^\s*|- |[{,]\s*)([\w.]+): +(?=\S)", place.before))
+    if not keys:
+        return None
+    begin = keys[-1]
+    rest = place.line[begin.end() :]
+    is_flow = place.before.count("{") > place.before.count("}")
+    end = re.search(r",\s*[\w.]+:(?:\s|$)|\s*[}\]]*\s*$" if is_flow else r"\s+#|\s*$", rest)
+    assert end is not None, "internal: a line has an end"
+    text = cures.in_quotes(rest[: end.start()])
+    start = place.source.index(place.source.span(place.line_number, begin.end() + 1))
+    return cures.write(f"{begin[1]}: {text}", place.source.edit(start, start + end.start(), text))
 
 
 def _first_character(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
@@ -149,7 +170,8 @@ def _first_character(problem: str, place: _Place, context: _Place) -> Diagnostic
         character = "a backquote" if place.character == "`" else f"`{place.character}`"
         return place.finding(f"not YAML: a text cannot begin with {character}; quote the text")
     if context.character and context.character in "&*" and "alphabetic" in problem:
-        hint = "write `and` for `&&`" if context.line[context.column - 1 :].startswith("&&") else None
+        doubled = context.line[context.column - 1 :].startswith("&&")
+        hint = "write `and` for `&&`" if doubled else None
         message = f"not YAML: a text cannot begin with `{context.character}`; quote the text"
         return context.finding(message, hint)
     if context.character and context.character in "|>" and "comment" in problem:

@@ -10,6 +10,7 @@ from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.schema.annotations import (
     CALLED,
@@ -33,7 +34,7 @@ from socialai_dsl.schema.scenario import (
     ThenRule,
     WorldRule,
 )
-from socialai_dsl.source import Data, DataPath, Node, Span
+from socialai_dsl.source import Data, DataPath, Node, Span, TextEdit
 
 _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
 """Keys of rules, which are mostly written inside { }."""
@@ -108,12 +109,23 @@ def _join_cut_values(repaired: Repair, entries: dict[str, Node], path: DataPath,
         whole = ", ".join([str(head), *(piece for piece, _ in pieces)])
         entries[key].value = whole
         first, part = pieces[0]
-        hint = f'write `{key}: "{whole}"`, or put every key on a line of its own'
+        hint = _joined(key, whole, entries[key], pieces[-1][1])
         word, space, rest = first.partition(" ")
-        if space and word in _KEYS:
-            hint = f"a colon is missing: write `{word}: {rest}`"
+        if space and word in _KEYS and part.span.key is not None:
+            colon = f"{word}: {rest}"
+            hint = cures.write(colon, TextEdit(part.span.key, colon), "a colon is missing")
         message = f"unknown key `{first}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
         bag.error("S102", message, part.key_span(), hint=hint)
+
+
+def _joined(key: str, whole: str, head: Node, last: Node) -> cures.Cure | str:
+    """The proposal to quote a value together with what a comma has cut off it."""
+    text = cures.in_quotes(whole)
+    source, behind = head.source, last.span.key
+    edit = None
+    if behind is not None:
+        edit = source.edit(head.span.start, source.index(behind) + behind.width, text)
+    return cures.write(f"{key}: {text}", edit, "or put every key on a line of its own")
 
 
 def _looks_cut(key: str, part: Node, before: str, path: DataPath) -> bool:
@@ -481,9 +493,12 @@ class _Report:
             near = did_you_mean(key, known)
             if near is None and owner is Register:
                 near = self._left_over(finding.path[:-1], key, known)
-            self._unknown_word(key, owner, called, known, near, span)
-        if owner is Register and near == "range" and ".." not in str(finding.value):
-            near = None  # `max: 9` is not a range under another name
+            bound = near == "range" and owner is Register and ".." not in str(finding.value)
+            if bound and type(finding.value) is int:  # `max: 9` is not a range under another name
+                self._bound(key, called, finding.path, finding.value)
+            else:
+                self._unknown_word(key, owner, called, known, near, span)
+            near = None if bound else near
         if near is None or near == _EXTENDS or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
 
@@ -494,6 +509,14 @@ class _Report:
         extra = [word for word in self._extra[parent] if did_you_mean(word, known) is None]
         missing = [word for word in known if word not in given]
         return dict(zip(extra, missing, strict=False)).get(key)
+
+    def _bound(self, key: str, called: str, path: DataPath, value: int) -> None:
+        """Report the least or greatest number of a register under a key of its own."""
+        part, text = self._places.at(path), f"range: {min(0, value)}..{max(0, value)}"
+        assert part.span.key is not None, "internal: an unknown key is a key"
+        edit = part.source.edit(part.source.index(part.span.key), part.end, text)
+        hint = cures.write(text, edit, "from the least to the greatest number")
+        self._bag.error("S101", f"unknown key `{key}` in {called}", part.span.key, hint=hint)
 
     def _unknown_word(
         self, key: str, owner: type | None, called: str, known: list[str], near: str | None, span: Span
@@ -555,7 +578,7 @@ class _Report:
         span = self._places.value_span(finding.path)
         for finding in findings:
             if finding.kind in ("greater_than_equal", "less_than_equal", "greater_than", "less_than"):
-                hint = _as_share(finding.value, finding.context.get("le"))
+                hint = self._as_share(finding)
                 self._bag.error("S106", f"`{finding.value}` is {_bound(finding)}", span, hint=hint)
                 return
             if finding.kind == "too_short" and any(p[:-1] == finding.path for p in self._repaired.lost):
@@ -577,7 +600,44 @@ class _Report:
         got = _kind_of(finding.value)
         key = finding.key
         what = f"`{key}` is {expected}" if key else f"{expected} is expected"
-        self._bag.error("S104", f"{what}, here is {got}", span, hint=_cure(key, expected, finding.value))
+        self._bag.error("S104", f"{what}, here is {got}", span, hint=self._cure(finding, expected))
+
+    def _as_share(self, finding: _Finding) -> cures.Hint:
+        """What a number in per cent is where a share is expected."""
+        value = finding.value
+        if finding.context.get("le") != 1 or not isinstance(value, int | float) or not 2 <= value <= 100:
+            return None
+        return self._instead(finding.path, f"{value / 100:g}", "it is a share, not per cent")
+
+    def _instead(self, path: DataPath, text: str, also: str = "") -> cures.Cure | str:
+        shown = f"{path[-1]}: {text}" if isinstance(path[-1], str) else text
+        return cures.write(shown, cures.over_value(self._places, path, text), also)
+
+    def _cure(self, finding: _Finding, expected: str) -> cures.Hint:
+        """What to write in place of a value of a wrong kind."""
+        key, value, path = finding.key, finding.value, finding.path
+        if isinstance(value, list) and len(value) == 2 and all(type(item) is int for item in value):
+            interval = f"{value[0]}..{value[1]}"
+            if key in _RANGES:
+                return self._instead(path, interval)
+            return self._instead(path, f"pick({interval})", "which draws one of them")
+        if isinstance(value, list) and expected == "an expression":
+            return "conditions are joined with `and` or `or`, alternatives are written a | b"
+        if isinstance(value, str) and (assigned := _ASSIGNMENT.fullmatch(value)) and "mapping" in expected:
+            return self._instead(path, f"{{{assigned[1]}: {assigned[2]}}}")
+        if isinstance(value, list | dict) and expected in ("a text", "an expression"):
+            return self._quoted(path, "brackets" if isinstance(value, list) else "braces or a colon")
+        return None
+
+    def _quoted(self, path: DataPath, what: str) -> cures.Hint:
+        """The proposal to quote what is written as a list or mapping in one line."""
+        part = self._places.get(path)
+        if part is None or part.substituted:
+            return None
+        written = part.source.text[part.span.start : part.end]
+        if "\n" in written:
+            return f"a value with {what} in it has to be quoted"
+        return self._instead(path, cures.in_quotes(written), f"a text with {what} in it has to be quoted")
 
     def _literal(self, finding: _Finding, span: Span) -> None:
         annotation = annotation_at(self._model, finding.path)
@@ -615,13 +675,6 @@ def _bound(finding: _Finding) -> str:
     return f"{limits.get(key, 'too large; at most')} {number} is expected"
 
 
-def _as_share(value: object, most: object) -> str | None:
-    """What a number in per cent is where a share is expected."""
-    if most != 1 or not isinstance(value, int | float) or not 2 <= value <= 100:
-        return None
-    return f"it is a share, not per cent: write {value / 100:g}"
-
-
 def _length(finding: _Finding) -> str:
     context = finding.context
     key = finding.key or "this"
@@ -635,22 +688,6 @@ def _length(finding: _Finding) -> str:
 
 _RANGES: Final = ("size", "width", "height", "range")
 _ASSIGNMENT: Final = re.compile(r"\s*(\w+)\s*=\s*([^=].*)")
-
-
-def _cure(key: str, expected: str, value: object) -> str | None:
-    """What to write in place of a value of a wrong kind."""
-    if isinstance(value, list) and len(value) == 2 and all(type(item) is int for item in value):
-        interval = f"{value[0]}..{value[1]}"
-        return f"a range is written {interval}" if key in _RANGES else f"`pick({interval})` draws one of them"
-    if isinstance(value, list) and expected == "a text":
-        return "a text in brackets has to be quoted"
-    if isinstance(value, list) and expected == "an expression":
-        return "conditions are joined with `and` or `or`, alternatives are written a | b"
-    if isinstance(value, str) and (assigned := _ASSIGNMENT.fullmatch(value)):
-        return f"write `{key}: {{{assigned[1]}: {assigned[2]}}}`" if "mapping" in expected else None
-    if isinstance(value, dict):
-        return "a value with `{ }` or a colon in it has to be quoted"
-    return None
 
 
 def _kind_of(value: object) -> str:

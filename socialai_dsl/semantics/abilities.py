@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from socialai_dsl import cures
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Activity
@@ -21,7 +22,8 @@ def check_actions(resolver: Resolver, found: Activity, word: Deed, node: ast.Exp
     if lacking:
         listed = " and ".join(f"`{action}`" for action in lacking)
         message = f"`{quoted(node)}` needs {listed}, which the agent cannot do"
-        hint = f"add {listed} to `actions`, or let the agent do without"
+        edits = (cures.added(resolver.findings.places, ("actions",), action) for action in lacking)
+        hint = cures.propose(f"add {listed} to `actions`", *edits, also="or let the agent do without")
         raise resolver.fail("S320", message, node, scope, hint=hint)
 
 

@@ -31,7 +31,7 @@ def of_slot(resolver: Resolver) -> tuple[str, tuple[int, ...]] | None:
             near = did_you_mean(name, symbols.slots)
             message = f"the grammar has no slot `{name}`"
             suggestion = f"<{near}>" if near else None
-            raise findings.fail("S201", message, findings.at(_PATH), suggestion=suggestion)
+            raise findings.fail("S201", message, findings.places.whole_span(_PATH), suggestion=suggestion)
         members = [value.value for value in slot.values if value.type.kind == "entity"]
         if not members or max(members) >= len(symbols.numbers):
             message = f"the slot `{name}` has something else than members of the cast, whom one can address"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
@@ -37,6 +38,7 @@ from socialai_dsl.semantics.scope import (
     reset_scope,
     step_scope,
     surviving,
+    usage,
     wrong_count,
 )
 from socialai_dsl.semantics.terms import (
@@ -105,9 +107,13 @@ def _unknown(
     given = f"({', '.join(map(quoted, args))})" if args else ""
     synonym = SYNONYMS.get(name)
     if synonym:
-        usage = synonym + (given or "(x)" if ACTIVITIES[synonym].takes else "")
-        purpose = {"use": "to toggle something ", "enter": "to go through something "}.get(synonym, "")
-        return resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
+        takes = ACTIVITIES[synonym].takes
+        purpose = {"use": "which toggles it", "enter": "which goes through it"}.get(synonym, "")
+        if len(takes) != len(args):
+            hint: cures.Hint = f"write `{usage(ACTIVITIES[synonym])}`"
+        else:
+            hint = resolver.instead(synonym + given, node, scope, purpose)
+        return resolver.fail("S205", f"unknown activity `{name}`", node, scope, hint=hint)
     advice = advice_on(name, ACTIVITIES, "activities are " + ", ".join(ACTIVITIES))
     return resolver.fail("S205", f"unknown activity `{name}`", node, scope, **advice)
 
@@ -499,7 +505,13 @@ class _Planner:
             message = (
                 f"`for` can be {term.type.low} here; a number that is not known beforehand is at least 1"
             )
-            findings.error("S106", message, findings.at(path), hint=f"write `max(1, {raw})`")
+            text = f"max(1, {raw})"
+            findings.error(
+                "S106",
+                message,
+                findings.at(path),
+                hint=cures.write(text, cures.over_part(findings.places, path, 0, None, text)),
+            )
             return None, None
         clock = Read(Type("int", 0, horizon), f"{self.played.member}.clock")
         lasted = Compare("<=", term, clock)
@@ -565,9 +577,15 @@ def _register_of_the_world(resolver: Resolver, path: DataPath, word: str) -> str
         message = f"`{word}` is a register of the frame `{frame}`, which only the frame itself sets"
         raise resolver.findings.fail("S305", message, span, hint=cure)
     near = did_you_mean(word, scenario.state)
-    hint = None if near or word in resolver.symbols.declared else f"declare it: `state: {{{word}: 0}}`"
+    declaration, places = f"{word}: 0", resolver.findings.places
+    edit = cures.added(places, ("state",), declaration) or cures.added(
+        places, (), f"state: {{{declaration}}}"
+    )
+    hint = cures.propose(f"declare it: `state: {{{declaration}}}`", edit)
+    if near or word in resolver.symbols.declared:
+        hint = ""
     message = f"`{word}` is not declared in `state`"
-    raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
+    raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint or None)
 
 
 def requirements(resolver: Resolver) -> Iterator[SitedTerm]:

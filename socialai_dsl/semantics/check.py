@@ -8,6 +8,7 @@ from dataclasses import replace
 from operator import itemgetter
 from typing import Final, get_args
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, advice_on, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
 from socialai_dsl.semantics import (
@@ -132,10 +133,9 @@ class _Entry:
                 name, most = self._rival(place, entry.rival or ""), entry.at_most
                 if most is None:
                     message = "`rival` needs `at_most`, the share of rooms that it may solve"
-                    hint = f"write `{{rival: {name}, at_most: 0.67}}`"
-                    raise self._findings.fail(
-                        "S105", message, self._findings.places.key_span(place), hint=hint
-                    )
+                    places = self._findings.places
+                    hint = cures.add("at_most: 0.67", cures.added(places, place, "at_most: 0.67"))
+                    raise self._findings.fail("S105", message, places.key_span(place), hint=hint)
                 return replace(plan, text=f"rival: {name} at most {most:g}", rival=name, share=most)
             case "needs":
                 members = self._members(place, entry.needs or ())
@@ -321,7 +321,12 @@ def _no_agent(scenario: Scenario, findings: Findings) -> None:
     if (near := did_you_mean(AGENT, scenario.cast)) is not None:
         findings.error("S105", f"{message}, but `{near}`", places.key_span(("cast", near)), suggestion=AGENT)
     else:
-        findings.error("S105", message, places.key_span(("cast",)), hint="add `agent: {}`")
+        findings.error(
+            "S105",
+            message,
+            places.key_span(("cast",)),
+            hint=cures.add("agent: {}", cures.added(places, ("cast",), "agent: {}")),
+        )
 
 
 def _without_consequences(findings: Findings, scenario: Scenario) -> Iterator[Diagnostic]:
@@ -562,14 +567,17 @@ class _Run:
         if len({places.key_span(path).file for path in (*parts, *paths, *idle)}) > 1:
             return
         for path in idle:
-            hint = f"delete it, or give it to a member of the cast: `frame: {path[-1]}`"
+            otherwise = f"or give it to a member of the cast: `frame: {path[-1]}`"
+            hint = cures.propose("delete it", cures.deleted(places, path), also=otherwise)
             self._findings.warning(
                 "W317", f"nobody follows the frame `{path[-1]}`", places.key_span(path), hint=hint
             )
         for path in paths:
             if path not in self.resolver.used:
                 name = str(path[-1]).partition("(")[0].strip()
-                hint = "delete it, or use it where it was meant"
+                hint = cures.propose(
+                    "delete it", cures.deleted(places, path), also="or use it where it was meant"
+                )
                 self._findings.warning("W317", f"nothing uses `{name}`", places.key_span(path), hint=hint)
 
     def _look_at(self, frame: PlayedFrame) -> None:

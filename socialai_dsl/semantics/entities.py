@@ -36,6 +36,7 @@ from socialai_dsl.semantics.scope import (
     frames_of,
     is_nothing,
     parse_define,
+    quoted,
     reset_scope,
     select,
     step_scope,
@@ -507,6 +508,11 @@ def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:
         low, high = (resolver.value(end, INT, scope) for end in (node.low, node.high))
         if isinstance(low, Const) and isinstance(high, Const) and low.value <= high.value:
             return Type("int", low.value, high.value)
+        if isinstance(low, Const) and isinstance(high, Const):
+            ordered = f"{high.value}..{low.value}"
+            hint = resolver.instead(ordered, node, scope, "from the least to the greatest number")
+            message = f"`{quoted(node)}` is empty: it ends below its start"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
     message = "a range is written a..b, from the least to the greatest number"
     raise resolver.findings.fail("S204", message, resolver.findings.at(path))
 

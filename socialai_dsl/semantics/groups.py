@@ -7,7 +7,7 @@ from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
-from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Frame, Sequence
 from socialai_dsl.semantics.plans import MemoryPlan
@@ -67,6 +67,11 @@ class Group:
     bounds: tuple[Term, Term] | None = None
 
 
+_GROUPS: Final = (
+    "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
+)
+
+
 def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
     """Whether an expression stands for several values."""
     match node:
@@ -112,10 +117,18 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
     if isinstance(single, Const):
         return Group(single.type, (single,))
     message = f"`{quoted(node)}` is {described(single.type)}, here a group is needed"
-    hint = (
-        "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
-    )
-    raise resolver.fail("S204", message, node, scope, hint=hint)
+    raise resolver.fail("S204", message, node, scope, hint=_GROUPS)
+
+
+def must_be_known(resolver: Resolver, node: ast.Expr, scope: Scope) -> None:
+    """Report a name that means nothing where only a group can stand, so that no text is taken for meant."""
+    if (
+        isinstance(node, ast.Name)
+        and resolver.means_nothing(node.id, scope)
+        and not is_group(resolver, node, scope)
+    ):
+        advice = advice_on(node.id, [*resolver.symbols.objects, *resolver.symbols.groups], _GROUPS)
+        raise resolver.no_such(node.id, f"there is no group `{node.id}`", node, scope, **advice)
 
 
 def is_everybody(resolver: Resolver, word: str) -> bool:
@@ -199,14 +212,15 @@ def _weighted(resolver: Resolver, option: ast.Expr, scope: Scope) -> tuple[int, 
             total = weight * value
             message = f"`{quoted(option)}` is the number {total} here, not {value} with a weight"
             often = " | ".join([str(value)] * weight) if weight in range(1, 7) else f"{value} | {value} | ..."
-            hint = f"for {value} with the weight {weight} write `{often}`, for {total} write `{total}`"
+            hint = resolver.instead(often, option, scope, f"for the number {total} write `{total}`")
             raise resolver.fail("S203", message, option, scope, hint=hint)
         case ast.Interval(
             low=ast.Arithmetic(op="*", left=ast.Number(), right=ast.Number()) as low, high=high
         ):
             each = f"{quoted(low.left)} * ({quoted(low.right)}..{quoted(high)})"
             message = f"`{quoted(option)}` begins at `{quoted(low)}`, and has no weight"
-            raise resolver.fail("S203", message, option, scope, hint=f"for each with a weight write `{each}`")
+            hint = resolver.instead(each, option, scope, "then each has the weight")
+            raise resolver.fail("S203", message, option, scope, hint=hint)
         case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=right) if not isinstance(
             right, ast.Number
         ):
@@ -257,8 +271,10 @@ def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> 
     if node.name not in resolver.words.quantifiers:
         message = f"`{node.name}({node.var} in ...)` is not known"
         if node.name in resolver.words.reserved and node.where is None and node.to is None:
-            condition = f"`{node.name}(({node.var} in {quoted(node.group)}))`"
-            hint = f"a comparison with `in` takes brackets of its own: {condition}"
+            condition = f"{node.name}(({node.var} in {quoted(node.group)}))"
+            hint = resolver.instead(
+                condition, node, scope, "a comparison with `in` takes brackets of its own"
+            )
             raise resolver.fail("S205", message, node, scope, hint=hint)
         raise resolver.fail(
             "S205", message, node, scope, suggestion=did_you_mean(node.name, resolver.words.quantifiers)

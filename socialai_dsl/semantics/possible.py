@@ -10,6 +10,7 @@ from heapq import merge
 from itertools import product
 from typing import Final
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Frame, Scenario, State, Step
@@ -31,7 +32,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.semantics.words import EFFECTS
-from socialai_dsl.source import DataPath, Span
+from socialai_dsl.source import DataPath, Span, TextEdit
 from socialai_dsl.vocabulary import Sentences, first_alike, normal
 
 ALIKE: Final = "case, blanks, a final mark and other forms of the same letters do not count"
@@ -70,13 +71,14 @@ def check_grammar(scenario: Scenario, findings: Findings) -> bool:
         twice = next((f"<{name}>" for name in names if template.count(f"<{name}>") > 1), "")
         if other or twice:
             offset = other.start() if other else template.rindex(twice)
+            width = len(other.group() if other else twice)
             message = f"a template has only one `{twice}`"
             if other:
                 filled = "one `<noun>`" if grammar.nouns else " and ".join(f"`<{name}>`" for name in names)
                 message = f"a template has {filled} to fill, and no `{other.group()}`"
             near = did_you_mean(other.group()[1:-1], grammar.slots) if other else None
             suggestion = f"<{near}>" if near else None
-            findings.error(GRAMMAR_CODE, message, findings.at(path, offset), suggestion=suggestion)
+            findings.error(GRAMMAR_CODE, message, findings.at(path, offset, width), suggestion=suggestion)
     for part, words in (("templates", grammar.templates), ("nouns", grammar.nouns)):
         check_alike(part, words, findings)
         for i, word in enumerate(words):
@@ -199,7 +201,10 @@ def _check_circles(states: dict[str, State], path: DataPath, findings: Findings)
         index = next(i for i, rule in enumerate(states[circle[0]].then) if rule.goto_now == circle[1])
         span = findings.at((*path, "states", circle[0], "then", index, "goto_now"), 0, len(circle[1]))
         message = f"would go round within one step: {_told(circle)}"
-        findings.error("S312", message, span, hint="write `goto` where the next step may come first")
+        key = TextEdit(
+            findings.places.key_span((*path, "states", circle[0], "then", index, "goto_now")), "goto"
+        )
+        findings.error("S312", message, span, hint=cures.write("goto", key, "then the next step comes first"))
 
 
 def _circles(edges: dict[str, list[str]]) -> Iterator[list[str]]:

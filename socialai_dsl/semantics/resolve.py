@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups, object_facts, resolve_names, rows, tables
 from socialai_dsl.semantics.conditional import conditional
 from socialai_dsl.semantics.groups import check_moment
-from socialai_dsl.semantics.resolve_names import without_arguments
+from socialai_dsl.semantics.resolve_names import synonym_of, without_arguments
 from socialai_dsl.semantics.resolver import INT, WORDED, Resolver, same_kind, text_value
 from socialai_dsl.semantics.scope import (
     Draws,
@@ -19,7 +20,6 @@ from socialai_dsl.semantics.scope import (
     described,
     quoted,
     spoken,
-    usage,
     wrong_count,
 )
 from socialai_dsl.semantics.terms import (
@@ -46,7 +46,7 @@ from socialai_dsl.semantics.terms import (
     number,
     one_of,
 )
-from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUE_SYNONYMS, VALUES, WORDS
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUES, WORDS
 from socialai_dsl.semantics.words.use import Use
 
 
@@ -98,11 +98,8 @@ def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> FailedError:
         return resolver.fail(
             "S204", f"`{node.name}` is {kind}; here a condition or value is expected", node, scope
         )
-    synonym = VALUE_SYNONYMS.get(node.name)
-    if synonym:
-        return resolver.fail(
-            "S205", f"unknown verb `{node.name}`; write `{usage(VALUES[synonym])}`", node, scope
-        )
+    if (meant := synonym_of(resolver, node.name, node, scope)) is not None:
+        return resolver.fail("S205", f"unknown verb `{node.name}`", node, scope, hint=meant)
     if node.name == "permuted":
         message = "`permuted` makes a table of another table, or the colours of a group of those of another"
         hint = "`tables: {dar: permuted(words)}`, `color: permuted(doors.color)`"
@@ -156,10 +153,10 @@ class ScenarioResolver(Resolver):
             case ast.Conditional():
                 return self.fit(conditional(self, node, expected, scope), expected, node, scope)
             case ast.Alternatives() | ast.Interval():
-                raise self.fail(
-                    "S204", f"`{quoted(node)}` is a choice of several, here one is needed", node, scope,
-                    hint=f"to draw one write `pick({quoted(node)})`; to ask for any of them write `in`",
-                )  # fmt: skip
+                message = f"`{quoted(node)}` is a choice of several, here one is needed"
+                also = "which draws one; to ask for any of them write `in`"
+                hint = self.instead(f"pick({quoted(node)})", node, scope, also)
+                raise self.fail("S204", message, node, scope, hint=hint)
             case ast.FilteredRegion():
                 raise self.fail(
                     "S210", "`where` belongs in a place or inside pick(d in group where ...)", node, scope
@@ -256,7 +253,10 @@ class ScenarioResolver(Resolver):
             return all_of([*_asked_for(left, right), alike])
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
         colored = {left.type.kind, right.type.kind} == {"color", "entity"}
-        hint = "the colour of something is `x.color`" if colored else None
+        hint: cures.Hint = "the colour of something is `x.color`" if colored else None
+        if isinstance(node, ast.Compare) and colored:
+            thing = node.left if left.type.kind == "entity" else node.right
+            hint = self.instead(f"{quoted(thing)}.color", thing, scope)
         raise self.fail("S204", message, node, scope, hint=hint)
 
     def _membership(self, node: ast.Member, scope: Scope) -> Term:

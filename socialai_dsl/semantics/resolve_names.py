@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain, pairwise
+from typing import Final
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
@@ -54,7 +56,7 @@ from socialai_dsl.semantics.words import (
 from socialai_dsl.semantics.words.attributes import coordinate
 from socialai_dsl.semantics.words.statuses import has_status
 from socialai_dsl.semantics.words.use import Use
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import Data, DataPath
 from socialai_dsl.vocabulary import normal
 
 
@@ -88,16 +90,36 @@ def _unknown_attribute(
         )
     if name == "believes" and isinstance(node, ast.Attribute):
         return resolver.fail("S211", object_facts.unnamed(quoted(node.subject)), node, scope)
-    synonym = VALUE_SYNONYMS.get(name)
-    if synonym:
-        return resolver.fail(
-            "S205", f"nothing here has a `{name}`; write `{usage(VALUES[synonym])}`", node, scope
-        )
+    if (meant := synonym_of(resolver, name, node, scope)) is not None:
+        return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, hint=meant)
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
     declared = [*resolver.symbols.scenario.looks, *_of_frame(resolver, node)]
     near = did_you_mean(name, [*known, *sorted(_statuses(resolver)), *declared])
     near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
     return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
+
+
+_HOLDERS: Final = ("content", "contains")
+"""What authors ask of a box, and the language of what lies in it."""
+
+
+def synonym_of(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> cures.Hint:
+    """The proposal to write the language's own word; only its use where what is asked is asked otherwise."""
+    synonym = VALUE_SYNONYMS.get(name)
+    if synonym is None:
+        return None
+    args = node.args if isinstance(node, ast.Call) else ()
+    signature = VALUES[synonym]
+    if name in _HOLDERS and isinstance(node, ast.Call | ast.Attribute) and node.subject is not None:
+        holder = quoted(node.subject)
+        if len(args) == 1:
+            return resolver.instead(f"{quoted(args[0])}.inside == {holder}", node, scope)
+        return f"what lies in it says so: `x.inside == {holder}`"
+    if len(signature.takes) != len(args):
+        return f"write `{usage(signature)}`"
+    written = f"{synonym}({', '.join(map(quoted, args))})" if args else synonym
+    edit = resolver.findings.instead(scope.path, node, written, only_name=True)
+    return cures.write(written, edit)
 
 
 def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
@@ -212,8 +234,10 @@ def slot_truth(resolver: Resolver, slot: str, raw: object, scope: Scope) -> Term
     """A condition that fills a slot of type bool."""
     if isinstance(raw, str) and raw.casefold() in _YES_AND_NO:
         truth = "true" if raw.casefold() in ("yes", "on", "y", "always") else "false"
-        span = resolver.findings.at(scope.path, 0, len(raw))
-        raise resolver.findings.fail("S204", f"slot `{slot}` is a bool: write `{truth}`", span)
+        findings = resolver.findings
+        hint = cures.write(truth, cures.over_value(findings.places, scope.path, truth))
+        message = f"slot `{slot}` is a bool: `true`, `false` or a condition"
+        raise findings.fail("S204", message, findings.at(scope.path, 0, len(raw)), hint=hint)
     return resolver.written(raw, BOOL, scope)  # type: ignore[arg-type]
 
 
@@ -294,7 +318,7 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
         case word if word in symbols.slots and _is_in_turn(scope):
             return _in_slot(resolver, word, scope.hearing)
         case word if word in symbols.slots and scope.frame is None:
-            hint = f"write `agent.{word}`: what the agent said there in this step"
+            hint = resolver.instead(f"agent.{word}", node, scope, "what the agent said there in this step")
             message = f"`{word}` is what a frame hears; here nothing is heard"
             raise resolver.fail("S211", message, node, scope, hint=hint)
         case "speaker":
@@ -364,7 +388,7 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         return resolver.no_such(word, message, node, scope, suggestion=called, hint=cure)
     near, place = suggestion(resolver, word, expected, scope)
     message = f"unknown name `{word}`"
-    hint: str | None = None
+    hint: cures.Hint = None
     if expected is not None and expected.words and expected.kind not in ("bool", "noun"):
         message = f"unknown name `{word}`, where {described(expected)} is expected"
         hint = None if near else "one of " + words_of(expected)
@@ -374,12 +398,35 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
     nouns = [noun for noun in resolver.symbols.nouns.words if normal(noun) == normal(word)]
     if nouns and (expected is None or expected.kind == "noun"):
         near, place = as_text(nouns[0], nouns[0] if whole == word else None), None
-        hint = "a noun is quoted, as every text"
+        hint = _quoting_nouns(resolver, whole, scope)
     elif near is None and expected is not None and expected.kind == "int" and not expected.words:
         message = f"unknown name `{word}`, where a number is expected"
-    elif near is None and expected is None:
-        hint = f"if a text is meant, quote it: {as_text(word, whole)}"
+    elif near is None and expected is None and not resolver.is_subject(node):
+        text = as_text(word, whole)
+        edit = resolver.findings.instead(scope.path, node, f'"{word}"')
+        if whole == word:
+            edit = cures.over_value(resolver.findings.places, scope.path, text)
+        hint = cures.propose(f"if a text is meant, quote it: {text}", edit)
     return resolver.no_such(word, message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
+
+
+def _quoting_nouns(resolver: Resolver, whole: Data, scope: Scope) -> cures.Cure | str:
+    """The proposal to quote every noun of an expression that is written without quotes."""
+    known = {normal(noun): noun for noun in resolver.symbols.nouns.words}
+    edits = []
+    if isinstance(whole, str):
+        tree = resolver.findings.expression(scope.path, whole)
+        for node in tree.walk():
+            if isinstance(node, ast.Name) and node.id not in scope.variables and normal(node.id) in known:
+                noun = known[normal(node.id)]
+                text = as_text(noun, noun) if node is tree else f'"{noun}"'
+                places = resolver.findings.places
+                edits.append(
+                    cures.over_value(places, scope.path, text)
+                    if node is tree
+                    else resolver.findings.instead(scope.path, node, text)
+                )
+    return cures.propose("a noun is quoted, as every text", *edits)
 
 
 def suggestion(

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import islice, product
 from math import prod
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Unpack
 
+from socialai_dsl import cures
+from socialai_dsl.diagnostics import Advice
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
@@ -632,12 +634,23 @@ class Resolver(ABC):
             return
         raise self.fail("S212", message, *self._within[0])
 
-    def fail(self, code: str, message: str, node: ast.Expr, scope: Scope, **more: str | None) -> FailedError:
+    def fail(
+        self, code: str, message: str, node: ast.Expr, scope: Scope, **more: Unpack[Advice]
+    ) -> FailedError:
         """Report what is wrong with a part of an expression; raising the result gives the expression up."""
         return self.findings.fail(code, message, self.findings.node(scope.path, node), **more)
 
+    def instead(self, text: str, node: ast.Expr, scope: Scope, also: str = "") -> cures.Cure | str:
+        """The proposal to write something else in the place of a part of an expression."""
+        return cures.write(text, self.findings.instead(scope.path, node, text), also)
+
+    def is_subject(self, node: ast.Expr) -> bool:
+        """Whether something is asked of what a name stands for that is being resolved: it is no text then."""
+        around = (part for part, _ in reversed(self._within))
+        return any(isinstance(part, ast.Attribute | ast.Call) and part.subject is node for part in around)
+
     def no_such(
-        self, word: str, message: str, node: ast.Expr, scope: Scope, **more: str | None
+        self, word: str, message: str, node: ast.Expr, scope: Scope, **more: Unpack[Advice]
     ) -> FailedError:
         """Report a name in an expression that means nothing there."""
         return self.findings.no_such(word, message, self.findings.node(scope.path, node), **more)
@@ -655,7 +668,7 @@ class Resolver(ABC):
             if value is not None:
                 return value
         message = f"`{quoted(node)}` is {described(term.type)}, but {described(expected)} is expected here"
-        hint = None
+        hint: cures.Hint = None
         if expected.kind == "bool" and term.type.kind == "text":
             hint = "write `true` or `false`"
         elif expected.words and expected.kind not in ("noun", "bool"):

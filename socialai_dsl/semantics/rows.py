@@ -33,6 +33,7 @@ def keys(resolver: Resolver, path: DataPath, raw: Expression) -> tuple[Const, ..
     """The group at `path`, for each of which there is a register."""
     scope = reset_scope(path)
     node = resolver.findings.expression(path, raw)
+    groups.must_be_known(resolver, node, scope)
     members = groups.group(resolver, node, None, scope)
     if members.type.kind in _KEYS and members.bounds is None:
         far = max((item.value for item in members.items), key=abs, default=0)

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, TypeVar
+from typing import Final, TypeVar, Unpack
 
-from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl import cures
+from socialai_dsl.diagnostics import Advice, DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text, rebuilt, unparse
 from socialai_dsl.schema.scenario import CastMember, Expression, Frame, Scenario
@@ -35,7 +36,7 @@ from socialai_dsl.semantics.terms import (
     one_of,
     where_there_is,
 )
-from socialai_dsl.source import Data, DataPath, Node, Span
+from socialai_dsl.source import Data, DataPath, Node, Span, TextEdit
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 from socialai_dsl.widths import LARGEST_NUMBER
 
@@ -106,27 +107,39 @@ class Findings:
         """The place of a part of the expression at `path`."""
         return self.at(path, *_extent(node))
 
-    def error(self, code: str, message: str, span: Span, **more: str | None) -> None:
+    def instead(self, path: DataPath, node: ast.Expr, text: str, only_name: bool = False) -> TextEdit | None:
+        """The edit that writes something else in the place of a part of the expression at `path`.
+
+        `only_name`: in that of `name(...)` of `subject.name(...)`.
+        """
+        start = node.at - isinstance(node, ast.Text)
+        if only_name and isinstance(node, ast.Call | ast.Attribute):
+            start = node.name_at
+        return cures.over_part(self.places, path, start, node.end, text) if node.end > start else None
+
+    def error(self, code: str, message: str, span: Span, **more: Unpack[Advice]) -> None:
         """Report an error."""
         self.bag.error(code, message, span, **more)
 
-    def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
+    def warning(self, code: str, message: str, span: Span, **more: Unpack[Advice]) -> None:
         """Report a warning."""
         self.bag.warning(code, message, span, **more)
 
-    def too_large(self, what: str, far: int, span: Span, when: str = "", **more: str | None) -> FailedError:
+    def too_large(
+        self, what: str, far: int, span: Span, when: str = "", **more: Unpack[Advice]
+    ) -> FailedError:
         """Report a number that nothing can keep; raising the result gives up the value it is in."""
         number = f"{far:,}" if abs(far) < _EXACTLY else f"{far:.1e}"
         limit = LARGEST_NUMBER if far > 0 else -LARGEST_NUMBER
         message = f"{what} can be {number}{when}, and numbers go {'up' if far > 0 else 'down'} to {limit:,}"
         return self.fail("S106", message, span, **more)
 
-    def no_such(self, word: str, message: str, span: Span, **more: str | None) -> FailedError:
+    def no_such(self, word: str, message: str, span: Span, **more: Unpack[Advice]) -> FailedError:
         """Report a name that means nothing there."""
         self.unknown.add(word)
         return self.fail("S201", message, span, **more)
 
-    def fail(self, code: str, message: str, span: Span, **more: str | None) -> FailedError:
+    def fail(self, code: str, message: str, span: Span, **more: Unpack[Advice]) -> FailedError:
         """Report an error; raising the result gives up the value it is in."""
         self.bag.error(code, message, span, **more)
         return FailedError()
@@ -160,19 +173,33 @@ class Findings:
         match = _BREAK.search(text)
         if match is None:
             return True
-        what, hint = "line break", "write it on one line, or behind `>-`, which makes one line of several"
+        what = "line break"
+        hint: cures.Hint = "write it on one line, or behind `>-`, which makes one line of several"
         if match.group() == "\t":
-            what, hint = "tab", "write a blank"
+            what, hint = (
+                "tab",
+                cures.propose(
+                    "write a blank", cures.over_part(self.places, path, match.start(), match.end(), " ")
+                ),
+            )
         message = f"there is a {what} in a text that is said or shown"
         self.error("S405", message, self.at(path, match.start()), hint=hint)
         return False
 
     def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
         code = "S212" if problem.code == "S004" else problem.code
-        hint = problem.hint if problem.hint and problem.hint not in str(problem) else None
+        hint: cures.Hint = problem.hint
         if problem.words and not _NO_TEXTS & {*path}:
             hint = f"{hint}; a text is quoted: {as_text(problem.words, self.part(path))}"
-        return self.fail(code, str(problem), self.at(path, problem.offset), hint=hint)
+        if problem.instead is not None:
+            start, end, text = problem.instead
+            edit = cures.over_part(self.places, path, start, end, text)
+            hint = (
+                cures.write(text.strip(), edit, problem.hint or "")
+                if text
+                else cures.propose("delete it", edit)
+            )
+        return self.fail(code, problem.message, self.at(path, problem.offset), hint=hint)
 
     def _filled(self, node: ast.Expr, path: DataPath) -> ast.Expr:
         if isinstance(node, ast.Parameter):
@@ -188,15 +215,15 @@ class Findings:
     def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:
         span = self.at(path, node.at, len(node.id) + 1)
         if node.id not in self.params:
-            raise self.fail(
-                "S206", f"unknown parameter `{node.id}`", span, suggestion=did_you_mean(node.id, self.params)
-            )
+            near = did_you_mean(node.id, self.params)
+            suggestion = f"${near}" if near else None
+            raise self.fail("S206", f"unknown parameter `{node.id}`", span, suggestion=suggestion)
         value = self.params[node.id]
         if isinstance(value, str):
             try:
                 tree = parse_expression(value)
             except ParseProblem as problem:
-                message = f"the value `{value}` of `{node.id}` is not an expression: {problem}"
+                message = f"the value `{value}` of `{node.id}` is not an expression: {problem.message}"
                 raise self.fail("S206", message, span) from None
             if named := next((part for part in tree.walk() if isinstance(part, ast.Parameter)), None):
                 message = f"the value `{value}` of `{node.id}` names a parameter, `{named.id}`, and a value names none"
@@ -218,6 +245,8 @@ def _extent(node: ast.Expr) -> tuple[int, int]:
             return node.at, len(word) + 1
         case ast.Number(value=value):
             return node.at, len(str(value))
+        case ast.Text() if node.end > node.at:
+            return node.at - 1, node.end - node.at + 1
         case _:
             return node.at, 1
 

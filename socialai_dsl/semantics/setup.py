@@ -6,6 +6,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
@@ -452,8 +453,8 @@ def _of_group(
         return None
     others = groups.group(resolver, node.subject, None, scope)
     if node.name != "color":
-        message = f"`{node.name}` gives no colours; write `{quoted(node.subject)}.color`"
-        raise resolver.fail("S205", message, node, scope)
+        hint = cures.write("color", resolver.findings.instead(path, node, "color", only_name=True))
+        raise resolver.fail("S205", f"`{node.name}` gives no colours", node, scope, hint=hint)
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)

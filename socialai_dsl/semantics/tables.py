@@ -74,7 +74,8 @@ def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
     key = resolver.value(node, ANY_TEXT if means_nothing else None, scope)
     if key.type.kind in _NO_KEYS:
         message = f"`{quoted(node)}` is {described(key.type)}; the keys of the table `{name}` are words"
-        hint = f"look up its colour: `{name}({quoted(node)}.color)`" if key.type.kind == "entity" else None
+        colored = f"{quoted(node)}.color"
+        hint = resolver.instead(colored, node, scope) if key.type.kind == "entity" else None
         raise resolver.fail("S204", message, node, scope, hint=hint)
     return key
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, groupby, islice, pairwise, product
 from typing import TypeGuard
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
@@ -85,9 +86,10 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
     for option in ast.options_of(node):
         slot = _slot(resolver, option, scope)
         if slot is not None:
-            found += [(one.text, one.drawn, resolver.findings.at(one.path)) for one in slot]
+            places = resolver.findings.places
+            found += [(one.text, one.drawn, places.whole_span(one.path)) for one in slot]
         elif isinstance(option, ast.Text):
-            found.append((option, None, resolver.findings.node(scope.path, node)))
+            found.append((option, None, resolver.findings.node(scope.path, option)))
         else:
             message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
             slots = scope.frame.texts if scope.frame is not None else ()
@@ -193,7 +195,9 @@ def _spliced(
             choices.append([((part,), None, None)])
             continue
         alone = len(text.parts) == 1
-        choices.append([(f.text.parts, f.drawn, findings.at(f.path) if alone else None) for f in slot])
+        choices.append(
+            [(f.text.parts, f.drawn, findings.places.whole_span(f.path) if alone else None) for f in slot]
+        )
     for choice in product(*choices):
         parts = [part for parts, _, _ in choice for part in parts]
         place = next((span for _, _, span in choice if span is not None), None)
@@ -253,11 +257,15 @@ def _report_unsayable(
         drawn_once = isinstance(value, Read) and not resolver.registers.is_set(value.path)
         report = findings.error if drawn_once else findings.warning
         slots = resolver.symbols.sentences.slots
-        missing = (
-            f"`{word}`" if word not in chain.from_iterable(s.words for s in slots) else "what is missing"
-        )
-        where = "the nouns" if slots[0].name == NOUN else "a slot of the grammar"
-        report("S402", message, span, hint=f"add {missing} to {where}, or narrow what is drawn")
+        otherwise = "or narrow what is drawn"
+        if word in chain.from_iterable(s.words for s in slots):
+            report("S402", message, span, hint=f"add what is missing to a slot of the grammar, {otherwise}")
+        elif slots[0].name == NOUN:
+            written = cures.in_quotes(word) if cures.needs_quotes(word, flow=True) else word
+            edit = cures.added(findings.places, ("grammar", "nouns"), written)
+            report("S402", message, span, hint=cures.add(word, edit, "`nouns`", otherwise))
+        else:
+            report("S402", message, span, hint=f"add `{word}` to a slot of the grammar, {otherwise}")
         return
     alternatives = [part for part in _JOINED.split(said) if part]
     if len(alternatives) > 1 and any(resolver.utterances.match(part) for part in alternatives):
@@ -280,7 +288,7 @@ def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
     """The line of a `say:`: pieces and values. The agent can say only utterances of its grammar."""
     findings = resolver.findings
     text = findings.text(path, raw)
-    span = findings.at(path)
+    span = findings.places.whole_span(path)
     only = text.parts[0] if len(text.parts) == 1 else None
     slot = _slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
     if slot is not None and len(slot) == 1:
@@ -394,7 +402,10 @@ def sayable(resolver: Resolver, node: ast.Expr, scope: Scope, or_condition: bool
     term = word_in_slot(resolver, node, scope) or resolver.value(node, None, scope)
     if term.type.kind not in SAYABLE and not (or_condition and term.type.kind == "bool"):
         what = described(term.type)
-        hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
+        hint: cures.Hint = None
+        if term.type.kind == "entity":
+            also = "or whatever else of it can be said"
+            hint = resolver.instead(f"{quoted(node)}.color", node, scope, also)
         raise resolver.fail(
             "S402", f"`{quoted(node)}` is {what}, which cannot be said", node, scope, hint=hint
         )
@@ -426,7 +437,11 @@ def heard_at(resolver: Resolver, raw: str, scope: Scope) -> Alternative:
     if raw == ANYTHING:
         return for_ears(resolver, [(resolver.utterances.anything(), None)], scope)
     text = resolver.findings.text(scope.path, raw)
-    return for_ears(resolver, patterns(resolver, text, scope, resolver.findings.at(scope.path), True), scope)
+    return for_ears(
+        resolver,
+        patterns(resolver, text, scope, resolver.findings.places.whole_span(scope.path), True),
+        scope,
+    )
 
 
 def for_ears(resolver: Resolver, heard: Alternative, scope: Scope) -> Alternative:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from socialai_dsl import cures
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, FramePlan, LookPlan
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import FieldOf, Read, SitedTerm, Term, walk
 from socialai_dsl.semantics.words import ACTIVITIES
 from socialai_dsl.source import Span
+
+_CHANNELS: Final = ("observe", "channels")
 
 _GESTURES: Final = 4
 """With more channels than these of the four plain ones the picture shows who points where."""
@@ -39,7 +42,7 @@ def check_unseen(checked: CheckedScenario, tone: str | None, findings: Findings)
 
 def _left_out(
     checked: CheckedScenario, tone: str | None, findings: Findings
-) -> Iterator[tuple[Reads, str, Span | None, str]]:
+) -> Iterator[tuple[Reads, str, Span | None, cures.Hint]]:
     """What asks for each thing that is left out, the thing in words, where it is shown first if it is, and the cure."""
     pointing = next(_pointing(checked), None)
     if checked.channels <= _GESTURES:
@@ -49,10 +52,17 @@ def _left_out(
     for look in checked.looks:
         if not look.shown and look.name != tone:
             span = findings.places.key_span(("looks", look.name))
-            yield _asks_for(look), f"the look `{look.name}`", span, f"add `{look.name}` to `channels`"
+            yield (
+                _asks_for(look),
+                f"the look `{look.name}`",
+                span,
+                cures.add(look.name, cures.added(findings.places, _CHANNELS, look.name), "`channels`"),
+            )
 
 
-def _relied_on(frames: tuple[FramePlan, ...], asks: Reads, what: str, hint: str, findings: Findings) -> bool:
+def _relied_on(
+    frames: tuple[FramePlan, ...], asks: Reads, what: str, hint: cures.Hint, findings: Findings
+) -> bool:
     """Whether the agent's frame goes by it, which is reported where it does so first."""
     for frame in frames:
         for part in ast.walk(frame):

@@ -8,6 +8,9 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,9 +19,11 @@ import pytest
 
 from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.diagnostics import CODES, render_text
+from socialai_dsl.diagnostics import CODES, Diagnostic, render_text
 from socialai_dsl.evaluation.testing import play_tests
 from socialai_dsl.frontend import CheckResult, check
+from socialai_dsl.source import Source
+from tests.quick import one_in
 from tests.slips import SLIPS, write_mistakes
 
 FOLDER = Path(__file__).parent
@@ -80,6 +85,56 @@ def test_the_files_that_the_mistakes_were_made_in_are_right(
 ) -> None:
     monkeypatch.chdir(FOLDER)
     assert check(name).diagnostics == ()
+
+
+# -- cures -----------------------------------------------------------------------------------------------------
+
+REVEALED = {
+    "061_unused_frame": {"W317"},  # warnings are said of files without errors
+    "101_shared_grammar": {"S401"},  # the grammar that is meant cannot say what the file needs
+    "113_drawn_file_missing": {"S213"},  # the only file with a like name is listed already
+    "625_state_with_max": {"S402"},  # the least number of the range, which nobody wrote, cannot be said
+    "700_experiment_slips": {"S704"},  # the agent that is meant needs a script
+    "703_no_such_checkpoint": {"S704"},
+    "883_looks": {"S205"},  # rules are read when what is drawn makes sense
+    "905_tests": {"S002"},  # two keys with one slip
+}
+"""The second mistakes of files that have several, which come to light when a first is cured."""
+
+
+def kinds(found: Iterable[Diagnostic]) -> Counter[tuple[str, str]]:
+    """How often each thing is said."""
+    return Counter((one.code, one.message) for one in found)
+
+
+@contextmanager
+def followed(found: Diagnostic, sources: dict[str, Source]) -> Iterator[None]:
+    """The files, in the working directory, as they are with a cure."""
+    files = {edit.span.file for edit in found.edits}
+    for file in files:
+        text = sources[file].edited(edit for edit in found.edits if edit.span.file == file)
+        Path(file).write_text(text, encoding="utf-8", newline="")
+    yield
+    for file in files:
+        Path(file).write_text(sources[file].text, encoding="utf-8", newline="")
+
+
+@pytest.mark.parametrize("case", one_in(2, CASES, "checks a file again for each of its cures"))
+def test_a_cure_works(case: str, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every change of files that a finding proposes is made: the finding is gone, and no other has come."""
+    monkeypatch.chdir(whole)
+    before = checked(case)
+    for found in before.diagnostics:
+        if not found.edits:
+            continue
+        with followed(found, before.sources):
+            left = check(f"{case}.yaml").diagnostics
+        said = (str(found), found.cure, [str(one) for one in left])
+        assert (
+            kinds(left)[found.code, found.message] < kinds(before.diagnostics)[found.code, found.message]
+        ), said
+        new = {one.code for one in left if (one.code, one.message) not in kinds(before.diagnostics)}
+        assert new <= REVEALED.get(case, set()), said
 
 
 # -- the pages -----------------------------------------------------------------------------------------------------

@@ -85,6 +85,25 @@ class Editor:
         before = plain.split("\n")[line - 1][: column - 1]
         return plain, lsp.Position(line - 1, len(before.encode("utf-16-le")) // 2)
 
+    async def cured(self, text: str) -> tuple[str, str] | None:
+        """The title of the cure of the only finding in a text, and the text with it."""
+        found = await self.change(text)
+        if not found:
+            return None
+        here = lsp.CodeActionParams(
+            lsp.TextDocumentIdentifier(self.uri), found[0].range, lsp.CodeActionContext(found)
+        )
+        answer = await self.client.text_document_code_action_async(here)
+        assert answer is not None
+        (action,) = answer
+        assert isinstance(action, lsp.CodeAction)
+        assert action.edit is not None
+        assert action.edit.changes is not None
+        ((uri, (edit,)),) = action.edit.changes.items()
+        assert uri == self.uri
+        start, end = (index_of(text, place) for place in (edit.range.start, edit.range.end))
+        return action.title, text[:start] + edit.new_text + text[end:]
+
     async def complete(self, text: str) -> list[str]:
         plain, position = self.at(text)
         await self.change(plain)
@@ -110,6 +129,13 @@ class Editor:
         assert isinstance(found, lsp.Location), found
         start = found.range.start
         return found.uri.rpartition("/")[2], start.line + 1, start.character + 1
+
+
+def index_of(text: str, place: lsp.Position) -> int:
+    """Where a position stands in a text; characters are counted in UTF-16."""
+    lines = text.split("\n")
+    before = lines[place.line].encode("utf-16-le")[: 2 * place.character].decode("utf-16-le")
+    return sum(len(line) + 1 for line in lines[: place.line]) + len(before)
 
 
 def session(folder: Path, script: Callable[[Editor], Awaitable[None]]) -> lsp.InitializeResult:
@@ -152,13 +178,25 @@ def test_a_session(tmp_path: Path) -> None:
         await hovers(editor)
         await definitions(editor)
         await formats(editor)
+        await cures(editor)
 
     answer = session(tmp_path, script)
     offered = answer.capabilities
     assert offered.hover_provider
     assert offered.definition_provider
     assert offered.completion_provider
+    assert offered.code_action_provider
     assert not (tmp_path / "heir.yaml").exists(), "nothing is written: the editor has the file"
+
+
+async def cures(editor: Editor) -> None:
+    """One behind a letter that takes two units, and one of several lines."""
+    text = SCENARIO.replace("eye_contact(agent)", "eye_contact(agnet)")
+    assert await editor.cured(text) == ("Write `agent`", SCENARIO)
+    alone = BASE.replace("abstract: true\n", "")
+    unused = alone.replace("cast:\n", "frames:\n  duty:\n    steps:\n      - {say: 🚪}\ncast:\n")
+    assert await editor.cured(unused) == ("Delete it", alone)
+    assert await editor.cured(alone) is None
 
 
 async def findings(editor: Editor) -> None:

@@ -21,7 +21,7 @@ def without_offsets(value: Any) -> Any:
         return tuple(map(without_offsets, value))
     if not isinstance(value, ast.Node):
         return value
-    names = [name for name in value.__dataclass_fields__ if name not in ("at", "name_at")]
+    names = [name for name in value.__dataclass_fields__ if name not in ("at", "end", "name_at")]
     return (type(value).__name__, *(without_offsets(getattr(value, name)) for name in names))
 
 

@@ -94,7 +94,8 @@ def test_names_of_variants_and_parameters() -> None:
     found = resolve("market+quiet+hidden?a=1&b=x y")
     assert (found.name, found.kind) == ("market+quiet+hidden", "scenario")
     assert found.params == {"a": "1", "b": "x y"}
-    assert found.param_span("b").column == len("market+quiet+hidden?a=1&") + 1
+    assert found.param_name_span("b").column == len("market+quiet+hidden?a=1&") + 1
+    assert found.param_span("b").column == len("market+quiet+hidden?a=1&b=") + 1
     assert list(data("market+quiet")["cast"]) == ["anna"]
     assert resolve("market_quiet").name == "market_quiet"
     assert data("market_quiet") == data("market+quiet")

@@ -93,7 +93,10 @@ def test_refusals_say_what_to_write() -> None:
     plain = read_plain("yes")
     assert plain.code == "S003"
     assert plain.message == "`yes` is `true` for some YAML tools and text for others"
-    assert plain.hint == 'write `true`; if you mean the text, quote it: "yes"'
+    assert (plain.instead, plain.also) == ("true", 'if you mean the text, quote it: "yes"')
+    assert [read_plain(text).instead for text in ("060", "+007", "0x10", "1_000", "-08")] == [
+        "60", "7", None, None, "-8",
+    ]  # fmt: skip
 
 
 WORD = st.text(alphabet="0123456789._-+:eExobnyNfaT~=<", min_size=1, max_size=8)
