@@ -148,6 +148,11 @@ class Diagnostic:
         return printable(f"{self.message}; did you mean {quoted}{place}?")
 
     @property
+    def help(self) -> str | None:
+        """The hint on one line, safe to print."""
+        return printable(str(self.hint)) if self.hint else None
+
+    @property
     def edits(self) -> tuple[TextEdit, ...]:
         """The changes of files after which it is gone; none where only advice can be given."""
         if isinstance(self.hint, Cure):
@@ -384,8 +389,8 @@ def _render_one(diagnostic: Diagnostic, source: Source | None, color: bool) -> s
     if source is not None:
         lines += _snippet(diagnostic.span, source, paint, reset)
     lines += [f"  {printable(note)}" for note in diagnostic.notes]
-    if diagnostic.hint:
-        lines.append(f"  {cyan}help:{reset} {printable(str(diagnostic.hint))}")
+    if diagnostic.help:
+        lines.append(f"  {cyan}help:{reset} {diagnostic.help}")
     return "\n".join(lines)
 
 
@@ -442,7 +447,7 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> list[dict[str, str | int | Non
             "severity": d.severity.value,
             "code": d.code,
             "message": d.text,
-            "hint": None if d.hint is None else str(d.hint),
+            "hint": d.help,
         }
         for d in diagnostics
     ]

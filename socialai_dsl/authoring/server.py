@@ -71,7 +71,7 @@ class Server(LanguageServer):
         return found
 
     def _finding(self, uri: str, found: Diagnostic, own: str) -> lsp.Diagnostic:
-        message = found.text if found.hint is None else f"{found.text}\n{found.hint}"
+        message = found.text if found.help is None else f"{found.text}\n{found.help}"
         span = found.span
         if span.file != own:  # what is wrong with a file that this one uses is shown at its top
             message, span = f"{span}: {message}", Span(own, 1, 1)

@@ -130,7 +130,7 @@ def _json(value: Any) -> str:
 
 
 def _with_hint(diagnostic: Diagnostic) -> str:
-    more = [*diagnostic.notes, *([str(diagnostic.hint)] if diagnostic.hint else [])]
+    more = [*diagnostic.notes, *filter(None, (diagnostic.help,))]
     return "\n".join([diagnostic.text, *map(printable, more)])
 
 

@@ -454,7 +454,7 @@ def _finding(found: Diagnostic, own: str) -> Reply:
     return {
         **_place(found.span, own),
         "message": found.text,
-        "help": None if found.hint is None else printable(found.hint),
+        "help": found.help,
         "notes": [printable(note) for note in found.notes],
         "code": found.code,
         "error": found.severity is Severity.ERROR,
