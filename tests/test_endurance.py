@@ -17,7 +17,7 @@ from socialai_dsl.loader.shipped import shipped_scenarios
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 IN_FOLDERS = [
     f"{path.parent.name}/{path.stem}"
-    for folder in ("novel", "school")
+    for folder in ("classics", "novel", "school")
     for path in sorted((SCENARIOS / folder).glob("*.yaml"))
     if re.search(r"^scenario: ", path.read_text(encoding="utf-8"), re.MULTILINE)
     and not re.search(r"^abstract: true", path.read_text(encoding="utf-8"), re.MULTILINE)

@@ -10,7 +10,7 @@ from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.errors import UsageError
-from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
+from socialai_dsl.loader.shipped import catalogue, shipped_scenarios, variants_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "write the data sheets of the shipped scenarios, or check that they are up to date"
 
+_IN_FOLDERS: Final = "classics/"
 MEASURED: Final = "measured.json"
 INDEX: Final = "README.md"
 _FOLDER: Final = Path("docs/scenarios")
@@ -55,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Measure, then write, then check; without any of the three print the sheets."""
-    names = arguments.scenarios or shipped_scenarios()
-    if unknown := [name for name in names if name not in shipped_scenarios()]:
-        raise UsageError(f"{unknown[0]}: no shipped scenario; there are {', '.join(shipped_scenarios())}")
+    names = arguments.scenarios or sheeted()
+    if unknown := [name for name in names if name not in sheeted()]:
+        raise UsageError(f"{unknown[0]}: no scenario with a sheet; there are {', '.join(sheeted())}")
     if arguments.measure is not None:
         _measure(names, arguments.measure)
     if arguments.out is not None:
@@ -71,6 +72,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
         for text in _pages(names, _FOLDER).values():
             print(text)
     return Exit.GOOD
+
+
+def sheeted() -> list[str]:
+    """The scenarios that have a sheet."""
+    return [*shipped_scenarios(), *(one.name for one in catalogue() if one.name.startswith(_IN_FOLDERS))]
 
 
 def stale_files(names: list[str], folder: Path) -> list[Path]:
@@ -94,7 +100,7 @@ def _pages(names: list[str], folder: Path) -> dict[str, str]:
 
     measured = _measurements(folder)
     texts = {f"{name}.md": page(name, _load(name), measured.get(name)) for name in names}
-    listed = [name for name in shipped_scenarios() if name in names or (folder / f"{name}.md").is_file()]
+    listed = [name for name in sheeted() if name in names or (folder / f"{name}.md").is_file()]
     texts[INDEX] = index({name: (_load(name), measured.get(name)) for name in listed})
     return texts
 
@@ -104,8 +110,8 @@ def _write(names: list[str], folder: Path) -> None:
 
     from tools.sheets_picture import picture
 
-    folder.mkdir(parents=True, exist_ok=True)
     for file, text in _pages(names, folder).items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / file, text)
     for name in names:
         drawn = picture(_load(name))

@@ -12,6 +12,7 @@ from socialai_dsl.loader.shipped import IDS, base_of, file_of, is_shipped, varia
 from socialai_dsl.program import Header
 from socialai_dsl.program_suite import ProgramSuite, channels_of
 from socialai_dsl.schema.scenario import CastMember
+from socialai_dsl.semantics.scope import Symbols
 
 _GENERATED: Final = "<!-- Written by `make sheets`; change the scenario's file and run it again. -->"
 _MEMBERS_SHOWN: Final = 40
@@ -41,12 +42,13 @@ def page(name: str, loaded: Loaded, measured: Mapping[str, Any] | None) -> str:
         measured: its entry among the measurements; None if there is none.
     """
     lines = [f"# {name}", "", _GENERATED, "", _about(name, _data(loaded)), ""]
-    lines += [f"![rooms of {name} at the start of an episode]({name}.png)", ""]
+    *folders, own = name.split("/")
+    lines += [f"![rooms of {name} at the start of an episode]({own}.png)", ""]
     lines += [
         "The arrow is the agent; what it sees is outlined. An NPC's dark triangle shows where it looks.",
         "",
     ]
-    return _sheet(lines, name, loaded, measured, f"{_FILES}/{name}.yaml")
+    return _sheet(lines, name, loaded, measured, "../" * len(folders) + f"{_FILES}/{name}.yaml")
 
 
 def _sheet(
@@ -153,7 +155,7 @@ def _variants(name: str) -> list[str]:
 
 def _as_coded(name: str) -> list[str]:
     """What the code of the paper does otherwise: the variant itself, since every line of it is one difference."""
-    if "as_coded" not in variants_of(name):
+    if "/" in name or "as_coded" not in variants_of(name):  # nothing in a folder is of the paper
         return []
     text = file_of(name, "as_coded").read_text(encoding="utf-8").rstrip()
     return ["## Paper and code", "", "The scenario follows the paper's text. Its code differs in this:", "",
@@ -225,7 +227,7 @@ def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[
            f"{len(grammar.templates)} templates with {len(words)} {'nouns' if grammar.nouns else 'slots'}:", "",
            "* " + " · ".join(map(code, grammar.templates)), "* " + " · ".join(map(code, words))]  # fmt: skip
     yield ["## Room", "", *items(data["room"])]
-    yield ["## Cast", "", *_cast(loaded, data)]
+    yield ["## Cast", "", *_cast(loaded)]
     if objects := data.get("objects"):
         yield [
             "## Objects",
@@ -254,10 +256,10 @@ def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[
     yield ["## Outcome", "", "The first that holds ends the episode:", "", *_outcomes(data)]
 
 
-def _cast(loaded: LoadedScenario, data: Mapping[str, Any]) -> list[str]:
+def _cast(loaded: LoadedScenario) -> list[str]:
     columns = ("who", "role", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
     rows, drawn = [], []
-    for key in data["cast"]:
+    for key in loaded.scenario.cast:
         alternatives = loaded.scenario.alternatives(key)
         rows.append(_member(key, alternatives[0], key == "agent"))
         if files := loaded.scenario.cast[key].one_of:
@@ -279,7 +281,7 @@ def _member(key: str, member: CastMember, agent: bool) -> tuple[str, ...]:
         code(key),
         member.role or "",
         "" if agent else member.kind or _DEFAULTS["kind"],
-        "" if agent else code(member.name or key.capitalize()),
+        "" if agent else code(member.name or Symbols.default_name(key)),
         code(where),
         code(member.facing or _DEFAULTS["facing"]),
         "" if agent else code(member.color or _DEFAULTS["color"]),

@@ -58,7 +58,11 @@ class Tellers:
         registers = table.state.registers[row]
         for entity in self._checked.entities:
             called = self._called(entity, registers)
-            if called is not None and line in table.heard(row) and line.startswith(f"{called}: "):
+            if (
+                called is not None
+                and line in table.heard(row)
+                and line.startswith((f"{called}: ", f"{called} to "))
+            ):
                 yield name_of(self._checked, entity.number)
 
     def _called(self, entity: Entity, registers: NDArray[np.int32]) -> str | None:

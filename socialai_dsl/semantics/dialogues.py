@@ -194,7 +194,7 @@ class _Test:
             place = (*path, "state", member)
             with self._surviving():
                 self._check_member(place, member)
-                called = ast.Call("is", (ast.Name(state),), self._findings.expression(place, member))
+                called = ast.Call("is", (ast.Name(state),), ast.Name(member))
                 scope = step_scope(place)
                 term = self._resolver.value(called, BOOL, scope)
                 sited = SitedTerm(term, scope.draws.site, self._findings.at(place))

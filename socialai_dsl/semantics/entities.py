@@ -497,7 +497,7 @@ def _declare_register(
     scope = scope.at(start, scope.draws.site)
     declared = Declaration(register, name, start, raw.start, scope, range=given, imagined=imagined)
     nothing = is_nothing(raw.start)
-    resolver.registers.declare(replace(declared, for_each=keys, starts_with_nothing=nothing, gathers=nothing))
+    resolver.registers.declare(replace(declared, for_each=keys, starts_with_nothing=nothing))
 
 
 def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:

@@ -181,7 +181,7 @@ class Declaration:
         imagined: it is only looked at, and never drawn.
         for_each: the keys of the group of which each has one. each: what each starts with, where that is a list.
         starts_with_nothing: until it is set.
-        gathers: it has room for whatever things it is set to. forgets: it may hold nothing again.
+        gathers: sources set it, as those of a belief. forgets: it may hold nothing again.
     """
 
     path: str
@@ -386,7 +386,7 @@ class Registers:
             self.words[path] = type_
             self.learned = True
         counted = type_.kind == "int" and not type_.words
-        if declaration.range is None and (counted or (declaration.gathers and type_.kind == "entity")):
+        if declaration.range is None and (counted or type_.kind == "entity"):
             own = self.ranges.get(path) or self._started(path) or type_
             self.ranges[path] = _union(own, type_)
 
@@ -410,8 +410,8 @@ class Registers:
             self._terms[path] = first.term
             return
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
-        may_widen = declaration.gathers and type_.kind == "entity"
-        if path in self._given_ranges and (may_widen or (type_.kind == "int" and not type_.words)):
+        may_widen = type_.kind == "entity" or (type_.kind == "int" and not type_.words)
+        if path in self._given_ranges and may_widen:
             type_ = _union(type_, self._given_ranges[path])
         empties = declaration.starts_with_nothing or declaration.forgets
         nothing = nothing_of(type_) if empties else None

@@ -517,10 +517,11 @@ class Symbols:
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
         return found | dict.fromkeys((*self.cast, *self.groups), "cast")
 
-    def default_name(self, member: str) -> str:
-        """How a member of the cast is called that has no `name`: its key."""
-        group = self.group_of(member)
-        key = f"{group[0]} {group[1] + 1}" if group is not None else member
+    @staticmethod
+    def default_name(member: str) -> str:
+        """How a member of the cast is called that has no `name`: its key, `peers[0]` as `Peers 1`."""
+        group, _, number = member.removesuffix("]").partition("[")
+        key = f"{group} {int(number) + 1}" if number else member
         return key[:1].upper() + key[1:].replace("_", " ")
 
     def group_of(self, member: str) -> tuple[str, int] | None:

@@ -17,12 +17,12 @@ from socialai_dsl.envs import ScenarioEnv
 Cell = tuple[int, int]
 Code = tuple[int, ...]
 
-NOVEL = tuple(
-    sorted(
-        path.stem
-        for path in (Path(__file__).parents[2] / "scenarios/novel").glob("*.yaml")
-        if not path.stem.endswith(("_oracle", ".tests"))
-    )
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+BEYOND = tuple(
+    f"{folder}/{path.stem}"
+    for folder in ("classics", "novel")
+    for path in sorted((SCENARIOS / folder).glob("*.yaml"))
+    if not path.stem.endswith(("_oracle", ".tests"))
 )
 """The scenarios beyond the paper and the School."""
 

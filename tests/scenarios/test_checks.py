@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 import socialai_dsl
@@ -23,21 +25,34 @@ CLAIMING = {
 }
 """How many properties are tried, `knowable` among them."""
 
-NOVEL = {
-    "bargaining": 3,
-    "culprit": 4,
-    "fetch": 2,
-    "gaze_following": 3,
-    "gossip": 4,
-    "haggling": 3,
-    "implicature": 6,
-    "interpreter": 2,
-    "reference_game": 5,
-    "sally_anne": 2,
-    "sarcasm": 5,
-    "second_order": 3,
-    "turn_taking": 2,
-    "whisper": 3,
+BEYOND = {
+    "classics/director_task": 5,
+    "classics/discrepant_desires": 5,
+    "classics/gaze_barriers": 6,
+    "classics/helper_hinderer": 6,
+    "classics/ice_cream_van": 5,
+    "classics/joint_commitment": 6,
+    "classics/mutual_exclusivity": 6,
+    "classics/over_imitation": 5,
+    "classics/selective_trust": 6,
+    "classics/social_referencing": 6,
+    "classics/story_in_turns": 6,
+    "classics/ultimatum": 7,
+    "novel/bargaining": 3,
+    "novel/culprit": 4,
+    "novel/fetch": 2,
+    "novel/gaze_following": 3,
+    "novel/gossip": 4,
+    "novel/haggling": 3,
+    "novel/implicature": 6,
+    "novel/interpreter": 2,
+    "novel/reference_game": 5,
+    "novel/sally_anne": 2,
+    "novel/sally_anne_watched": 4,
+    "novel/sarcasm": 5,
+    "novel/second_order": 3,
+    "novel/turn_taking": 2,
+    "novel/whisper": 3,
 }
 
 CLAIMING_NOTHING = [
@@ -70,10 +85,12 @@ def test_claims_hold_in_some_rooms(name: str) -> None:
 def test_no_claiming_scenario_is_left_out() -> None:
     folder = shipped_folder()
     claiming = {
-        file.stem for file in folder.rglob("*.yaml") if "\ncheck:" in file.read_text(encoding="utf-8")
+        file.relative_to(folder).with_suffix("").as_posix()
+        for file in folder.rglob("*.yaml")
+        if re.search(r"^check:|^ +- {rival:", file.read_text(encoding="utf-8"), re.MULTILINE)
     }
-    assert claiming == {name for name in CLAIMING if "+" not in name} | set(NOVEL) | {
-        "information_seeking_base"
+    assert claiming == {name for name in CLAIMING if "+" not in name} | set(BEYOND) | {
+        "school/information_seeking_base"
     }
 
 
@@ -111,8 +128,8 @@ def test_a_problem_of_the_school_can_be_known_by_its_cue(problem: str, cue: str)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*CLAIMING, *NOVEL])
+@pytest.mark.parametrize("name", [*CLAIMING, *BEYOND])
 def test_claims_hold_in_many_rooms(name: str) -> None:
-    found = verdicts(f"novel/{name}" if name in NOVEL else name, 60)
-    assert len(found) == (CLAIMING | NOVEL)[name]
+    found = verdicts(name, 60)
+    assert len(found) == (CLAIMING | BEYOND)[name]
     assert [said for said in found.values() if not said.startswith("holds")] == []

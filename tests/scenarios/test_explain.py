@@ -16,13 +16,13 @@ from socialai_dsl.frontend import LoadedScenario, load
 from tests.quick import one_in
 from tests.reference import frames, rules
 from tests.reference.interpreter import Reference
-from tests.scenarios.playing import NOVEL
+from tests.scenarios.playing import BEYOND
 
 ROOT = Path(__file__).parents[2]
 NAMES = [
     *("talkitout", "talkitout+oracle", "talkitout+as_coded", "dance", "dance+oracle", "cointhief", "cointhief+oracle"),
     *("diverse_exit", "diverse_exit+oracle", "showme+oracle", "help", "help+oracle", "help_as_helper+oracle"),
-    *(f"novel/{name}+oracle" for name in NOVEL),
+    *(f"{name}+oracle" for name in BEYOND),
     *("school/apple_stealing+oracle", "school/levers+oracle", "school/marble_pass+oracle"),
     *("school/color_match_switches+oracle", "school/boxes+oracle"),
 ]  # fmt: skip

@@ -10,8 +10,8 @@ import pytest
 import socialai_dsl as sd
 from tests.quick import one_in
 from tests.scenarios.playing import (
+    BEYOND,
     FORWARD,
-    NOVEL,
     Episode,
     beside,
     check_shares,
@@ -43,16 +43,16 @@ def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]
             return env.describe(), info, float(reward)
 
 
-@pytest.mark.parametrize("name", one_in(4, NOVEL, "plays 300 rooms"))
+@pytest.mark.parametrize("name", one_in(4, BEYOND, "plays 300 rooms"))
 def test_the_rooms_can_be_solved(name: str) -> None:
     """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
-    solved = sum(bool(played(f"novel/{name}+oracle", seed)[1]["success"]) for seed in range(300))
-    assert solved >= (298 if name == "culprit" else 300)
+    solved = sum(bool(played(f"{name}+oracle", seed)[1]["success"]) for seed in range(300))
+    assert solved >= (298 if name == "novel/culprit" else 300)
 
 
-@pytest.mark.parametrize("name", NOVEL)
+@pytest.mark.parametrize("name", BEYOND)
 def test_nothing_looks_odd(name: str) -> None:
-    assert sd.load(f"novel/{name}+oracle").warnings == ()
+    assert sd.load(f"{name}+oracle").warnings == ()
 
 
 class TestWhisper:

@@ -9,7 +9,7 @@ from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
 from socialai_dsl.episodes.scripts import script_of
 from tests.quick import one_in
-from tests.scenarios.playing import NOVEL
+from tests.scenarios.playing import BEYOND
 
 ROOMS = 40
 PAPER = (
@@ -26,7 +26,7 @@ SCHOOL = tuple(
 )
 
 
-ALL = [*PAPER, *(f"novel/{name}" for name in NOVEL), *SCHOOL]
+ALL = [*PAPER, *BEYOND, *SCHOOL]
 
 
 @pytest.mark.parametrize("name", one_in(8, ALL, "plays many rooms of every scenario"))

@@ -10,7 +10,6 @@ from PIL import Image
 import socialai_dsl
 from socialai_dsl.analysis.data_sheet import page
 from socialai_dsl.analysis.sheet_text import flow, frame, rule, table
-from socialai_dsl.loader.shipped import shipped_scenarios
 from tools import sheets
 from tools.sheets import INDEX, main, measure, stale_files
 from tools.sheets_picture import picture
@@ -18,7 +17,9 @@ from tools.sheets_picture import picture
 Capture = pytest.CaptureFixture[str]
 
 SHEETS = Path(__file__).parents[2] / "docs" / "scenarios"
-WRITTEN = sorted(path.stem for path in SHEETS.glob("*.md") if path.name != INDEX)
+WRITTEN = sorted(
+    path.relative_to(SHEETS).with_suffix("").as_posix() for path in SHEETS.rglob("*.md") if path.name != INDEX
+)
 LINK = re.compile(r"\]\((?!https?://|#)([^)\s]+)\)")
 
 
@@ -31,11 +32,12 @@ def test_links_of_the_sheets_lead_somewhere() -> None:
     for name in WRITTEN:
         text = (SHEETS / f"{name}.md").read_text(encoding="utf-8")
         targets = [target for target in LINK.findall(text) if not target.endswith(".md")]
-        assert f"../../scenarios/{name}.yaml" in targets
-        assert [target for target in targets if not (SHEETS / target).exists()] == [], name
+        folder = (SHEETS / name).parent
+        assert f"{'../' * name.count('/')}../../scenarios/{name}.yaml" in targets
+        assert [target for target in targets if not (folder / target).exists()] == [], name
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", sheets.sheeted())
 def test_every_shipped_scenario_has_a_page_and_a_picture(name: str) -> None:
     loaded = socialai_dsl.load(name)
     text = page(name, loaded, None)
@@ -117,7 +119,7 @@ def test_what_is_out_of_date_is_noticed(file: str, capsys: Capture, tmp_path: Pa
 
 def test_usage(capsys: Capture) -> None:
     assert main(["nowhere"]) == 2
-    assert "nowhere: no shipped scenario; there are talkitout, " in capsys.readouterr().err
+    assert "nowhere: no scenario with a sheet; there are talkitout, " in capsys.readouterr().err
 
 
 def test_tables_drop_empty_columns_and_keep_bars() -> None:

@@ -194,6 +194,12 @@ def test_cues_of_those_who_may_tell_are_no_leaks(tried: Trying) -> None:
     assert not report.said.startswith(f"of {2 * ROOMS} pairs of episodes 0 "), "the script asks her"
 
 
+def test_a_line_to_somebody_is_a_cue_of_who_says_it(tried: Trying) -> None:
+    addressed = ("say: ", "to: agent, say: ")
+    assert tried("{only_through: {draw: exit, by: [ada]}}", addressed).verdict is Verdict.HOLDS
+    assert tried("{only_through: {draw: exit, by: [bob]}}", addressed).said.endswith(", in `ada`")
+
+
 def test_cues_of_others_are_leaks(tried: Trying) -> None:
     report = tried("{only_through: {draw: exit, by: [bob]}}")
     assert report.verdict is Verdict.FAILS

@@ -38,7 +38,7 @@ def test_a_scenario_has_its_sheet(capsys: pytest.CaptureFixture[str]) -> None:
     assert "* `talkitout+unsocial`: " in sheet
 
 
-@pytest.mark.parametrize("name", ["dance+unsocial", "school/collaboration", "novel/whisper"])
+@pytest.mark.parametrize("name", ["dance+unsocial", "school/collaboration", "novel/whisper", "novel/gossip"])
 def test_so_has_everything_that_can_be_loaded(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main.main(["explain", name]) == 0
     assert capsys.readouterr().out.startswith(f"# {name}\n")

@@ -116,3 +116,10 @@ def test_what_is_earned(meaning):
 )
 def test_what_cannot_be_earned_or_seen(examine, sections, code):
     assert [d.code for d in examine(**sections).diagnostics] == [code]
+
+
+def test_there_is_room_for_whoever_it_is_set_to(meaning):
+    rules = [{"when": "t > 3", "set": {"whose": "agent"}}, {"when": "t > 4", "set": {"whose": "pick(cast)"}}]
+    cast = {"guide": {"count": 3}}
+    checked = meaning(state={"whose": "pick(guide)"}, rules=rules, cast=cast)
+    assert register(checked, "state.whose") == (0, 3)
