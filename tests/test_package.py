@@ -78,6 +78,8 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
         assert f"trainer/agents/{path.relative_to(ROOT / 'agents')}" in names
     for path in (ROOT / "docs" / "diagnostics").glob("*.md"):
         assert f"socialai_dsl/pages/{path.name}" in names
+    for path in (ROOT / "docs" / "cookbook").rglob("*.yaml"):
+        assert f"socialai_dsl/cookbook/{path.relative_to(ROOT / 'docs' / 'cookbook')}" in names
     for package in ("socialai_dsl", "trainer"):
         for path in (ROOT / package).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts:

@@ -74,6 +74,28 @@ def shipped_scenarios() -> list[str]:
     return list(dict.fromkeys([*of_the_paper, *others]))
 
 
+@dataclass(frozen=True)
+class Recipe:
+    """A scenario of the cookbook: its file, and what it says of itself."""
+
+    path: Path
+    about: str
+
+
+@cache
+def recipes() -> dict[str, Recipe]:
+    """The scenarios of the cookbook by name, `cookbook/shy`."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "cookbook"
+    folder = installed if installed.is_dir() else package.parent / "docs" / "cookbook"
+    found = {}
+    for path in sorted(folder.glob("*.yaml")):
+        content = read_document(path).data
+        if isinstance(content, dict) and "scenario" in content:
+            found[f"cookbook/{path.stem}"] = Recipe(path, " ".join(str(content.get("about", "")).split()))
+    return found
+
+
 def variants_of(scenario: str) -> list[str]:
     """What can follow a scenario's name after a `+`: variants of its own, then those that suit every scenario.
 

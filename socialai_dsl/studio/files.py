@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.atomic import write_text
+from socialai_dsl.atomic import read_json, write_text
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import FORBIDDEN, MAX_FILE_BYTES, SUFFIXES, read_source
+from socialai_dsl.loader.resolved import taken_apart
+from socialai_dsl.runs.folder import CONFIG
 from socialai_dsl.studio.drafts import Draft, Drafts, new_window
-from trainer.shipped import PREFIX, shipped_agents
+from trainer.shipped import PREFIX, located, shipped_agents
 
 PLAYERS: Final = ("me", "script", "random")
 _MOST_FILES: Final = 500
@@ -89,6 +91,15 @@ class Folder:
         """The trained agents to watch: of the folder's runs, and those that ship."""
         return [*self.runs(), *(PREFIX + name for name in shipped_agents())]
 
+    def trained_on(self, name: str) -> str:
+        """The scenario on which one of `players` was trained, as the stem of its file; empty where nobody knows."""
+        folder = located(name) if name.startswith(PREFIX) else self.root / name
+        try:
+            scenario = read_json(folder / CONFIG).get("scenario")
+        except (OSError, ValueError, UsageError):
+            return ""
+        return Path(taken_apart(str(scenario))[0]).stem
+
     def player(self, name: str) -> str:
         """A player as `Session.begin` knows it; runs are named as seen from the folder.
 
@@ -157,6 +168,7 @@ class Folder:
                 if not os.access(path, os.W_OK):
                     raise FileError(f"{name}: this user may not write the file")
                 self._make_way(name, text, known, over)
+            path.parent.mkdir(parents=True, exist_ok=True)
             write_text(path, text)
             self._drafts.forget(name, window)
         return digest(text)
@@ -171,6 +183,13 @@ class Folder:
                 free, number = f"{stem}_{number}{suffix}", number + 1
             self.write(free, text, None, window)
         return free
+
+    def holds(self, name: str, text: str) -> bool:
+        """Whether there is a file of this name with just this text."""
+        try:
+            return self.read(name)[0] == text
+        except FileError:
+            return False
 
     def is_taken(self, name: str) -> bool:
         """Whether there is something of this name, or of one that some file systems do not tell from it."""

@@ -8,10 +8,10 @@ from typing import Any, Final
 from socialai_dsl.authoring.templates import TEMPLATES, template_files
 from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.pages import page_of
-from socialai_dsl.loader.shipped import file_of, shipped_scenarios, variants_of
 from socialai_dsl.studio import messages
 from socialai_dsl.studio.drafts import Draft
 from socialai_dsl.studio.files import FileError, Folder
+from socialai_dsl.studio.starts import copied, offered
 
 
 class Filing:
@@ -38,9 +38,10 @@ class Filing:
         del asked
         return {
             "files": self._folder.scenarios(),
-            "runs": self._folder.players(),
-            "shipped": shipped_scenarios(),
-            "templates": TEMPLATES,
+            "agents": [
+                {"name": name, "scenario": self._folder.trained_on(name)} for name in self._folder.players()
+            ],
+            "starts": [{"heading": heading, "names": names} for heading, names in offered()],
         }
 
     def _read(self, asked: messages.Read) -> dict[str, Any]:
@@ -74,17 +75,17 @@ class Filing:
         return {}
 
     def _copy(self, asked: messages.Copy) -> dict[str, Any]:
-        shipped = asked.shipped
-        if shipped not in shipped_scenarios():
-            raise FileError(f"{shipped[:80]!a}: there is no such shipped scenario")
-        name = self._create_file(f"{shipped}.yaml", file_of(shipped).read_text(encoding="utf-8"))
-        if "oracle" in variants_of(shipped):
-            script = file_of(shipped, "oracle")
-            stem = name.removesuffix(".yaml")
-            if script.stem != "oracle":
-                text = script.read_text(encoding="utf-8")
-                self._create_file(f"{stem}_oracle.yaml", text.replace(f"of: {shipped}\n", f"of: {stem}\n"))
-        return {"name": name}
+        try:
+            texts = copied(asked.shipped, self._folder.is_taken)
+        except KeyError:
+            raise FileError(f"{asked.shipped[:80]!a}: there is no such scenario to copy") from None
+        new = {name: text for name, text in texts.items() if not self._folder.holds(name, text)}
+        taken = next((name for name in new if self._folder.is_taken(name)), None)
+        if taken is not None:
+            raise FileError(f"{taken} exists already, and the copy needs one that is different")
+        for name, text in new.items():
+            self._folder.write(name, text, None, self._window)
+        return {"name": next(iter(texts))}
 
     def _create(self, asked: messages.Create) -> dict[str, Any]:
         template, called = asked.template, asked.called

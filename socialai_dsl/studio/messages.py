@@ -387,12 +387,26 @@ class Episode(_Part):
     seats: list[Seat]
 
 
+class Plays(_Part):
+    """Who can play a scenario, besides a person and chance.
+
+    Attributes:
+        names: by which agents know it that were trained on it.
+        script: whether the agent has one. rivals: strategies that lack the skill.
+    """
+
+    names: list[str]
+    script: bool
+    rivals: list[str]
+
+
 class Drawn(_Message):
     """Findings, and the beginning of an episode unless there are errors or it is refused."""
 
     do: Literal["draw"]
     findings: list[Finding]
     refused: str | None = None
+    plays: Plays | None = None
     episode: Episode | None = None
 
 

@@ -79,14 +79,26 @@ class Session:
         whole = found.whole
         self._scenario = self._file if whole is None else whole.path
         try:
-            self._use(load(str(self._scenario), self._texts))
+            loaded = load(str(self._scenario), self._texts)
+            self._use(loaded)
         except ScenarioError as error:  # it is sound, and nothing that can be played
             return {"findings": [*told, *(_finding(one, own) for one in error.diagnostics)]}
         self._player, self._variant = "me", ""
         try:
-            return {"findings": told, **self.begin(room)}
+            return {"findings": told, "plays": self._plays(loaded), **self.begin(room)}
         except RefusalError as refusal:
             return {"findings": told, "refused": str(refusal)}
+
+    def _plays(self, loaded: Loaded) -> Reply:
+        """Who can play it."""
+        try:
+            script = self._has_script("")
+        except ScenarioError:  # the variant with it has mistakes, which are told where it is opened
+            script = False
+        rivals = list(loaded.scenario.rivals) if isinstance(loaded, LoadedScenario) else []
+        declared = loaded.resolved.tree.entry(loaded.resolved.kind)
+        names = {self._scenario.stem, loaded.name, *([] if declared is None else [str(declared.value)])}
+        return {"names": sorted(names), "script": script, "rivals": rivals}
 
     def begin(self, room: Room = _FIRST, player: str = "me", variant: str = "") -> Reply:
         """Begin an episode.

@@ -603,6 +603,37 @@ def test_the_script_is_watched_and_sentences_are_built(studio: Page) -> None:
     studio.locator(".counts small", has_text=re.compile(r"[1-9]× in 3 episodes")).first.wait_for()
 
 
+def test_who_can_play_comes_first(shy: Page) -> None:
+    players = shy.get_by_label("who plays")
+    assert players.locator("> option").all_inner_texts() == ["me", "random"]
+    first, *_, last = players.locator("optgroup").evaluate_all("all => all.map(one => one.label)")
+    assert (first, last) == ("rivals, which lack the skill", "trained on other scenarios")
+    with another_room(shy):
+        players.select_option("rival hasty")
+    shy.get_by_role("button", name="watch").click()
+    shy.locator(".message.good", has_text="success").wait_for()
+    with another_room(shy):
+        shy.get_by_role("button", name="Another room").click()
+    assert players.input_value() == "+hasty"
+    with another_room(shy):
+        players.select_option("me")
+    with another_room(shy):
+        shy.get_by_label("scenario", exact=True).and_(shy.locator("select")).select_option("other.yaml")
+    assert "trained on it" in players.locator("optgroup").evaluate_all("all => all.map(one => one.label)")
+
+
+def test_a_recipe_of_the_cookbook_is_copied(studio: Page, folder: Path) -> None:
+    studio.get_by_role("button", name="New…").click()
+    copies = studio.get_by_label("scenario to copy")
+    headings = copies.locator("optgroup").evaluate_all("all => all.map(one => one.label)")
+    assert "the cookbook: one idea each" in headings
+    assert "new scenarios" in headings
+    copies.select_option("cookbook/shy")
+    with another_room(studio):
+        studio.get_by_role("button", name="Open a copy").click()
+    assert (folder / "shy.yaml").exists()
+
+
 def test_a_template_becomes_a_file(studio: Page, folder: Path) -> None:
     studio.get_by_role("button", name="New…").click()
     studio.get_by_label("name").fill("mine")

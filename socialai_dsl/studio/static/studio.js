@@ -57,6 +57,7 @@ class Studio {
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.another({ seed: Number(this.seedField.value) }) });
     this.roomField = make("input", { type: "number", min: 0, value: 0, "aria-label": "number of the room", title: "which room of the seed, as checks number them", onchange: () => this.another({ seed: Number(this.seedField.value), index: Number(this.roomField.value) }) });
     this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin() });
+    /** @type {Reply} who can play, besides me and chance */ this.plays = { names: [], script: false, rivals: [] };
     this.seated = make("input", { type: "checkbox", onchange: () => this.sit() });
     this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
     this.count = make("output", {});
@@ -92,7 +93,7 @@ class Studio {
   /** @param {Record<string, {root: HTMLElement}>} parts */
   layout(parts) {
     const button = (/** @type {string} */ text, /** @type {() => void} */ act, title = text) => make("button", { onclick: act, title }, text);
-    const bar = make("header", {}, this.title, this.files, button("New…", () => this.offer(), "a template, or a copy of a shipped scenario"),
+    const bar = make("header", {}, this.title, this.files, button("New…", () => this.offer(), "a template, or a copy of a scenario that ships or is in the cookbook"),
       button("Save", () => this.save(), "Ctrl-S"), this.state, this.kept,
       make("label", {}, this.wraps, " wrap lines"),
       make("span", { class: "filler" }),
@@ -137,9 +138,28 @@ class Studio {
     this.offered = found;
     const option = (/** @type {string} */ name) => make("option", { value: name, selected: name === this.name }, name);
     this.files.replaceChildren(...(found.files ?? []).map(option));
-    const chosen = this.players.value;
-    this.players.replaceChildren(...["me", "script", "random", ...(found.runs ?? [])].map((name) => make("option", { value: name, selected: name === chosen }, name)));
+    this.offerPlayers();
     if (!found.files?.length) this.offer();
+  }
+
+  /** Who can play this scenario; agents that were trained on others come last, and apart. */
+  offerPlayers() {
+    const { names, script, rivals } = this.plays, chosen = this.players.value || "me";
+    const option = (/** @type {string} */ value, word = value) => make("option", { value, selected: value === chosen }, word);
+    /** @type {Reply[]} */ const agents = this.offered?.agents ?? [];
+    const own = agents.filter((one) => names.includes(one.scenario)), others = agents.filter((one) => !names.includes(one.scenario));
+    const group = (/** @type {string} */ label, /** @type {HTMLOptionElement[]} */ options) => (options.length ? [make("optgroup", { label }, ...options)] : []);
+    this.players.replaceChildren(option("me"), ...(script ? [option("script")] : []), option("random"),
+      ...group("rivals, which lack the skill", rivals.map((/** @type {string} */ name) => option(`+${name}`, `rival ${name}`))),
+      ...group("trained on it", own.map((one) => option(one.name))),
+      ...group("trained on other scenarios", others.map((one) => option(one.name, one.scenario && !one.name.endsWith(one.scenario) ? `${one.name} (${one.scenario})` : one.name))));
+  }
+
+  /** Who plays, and what is played: a rival is a variant of the scenario, with a script. */
+  chosen() {
+    const { value } = this.players, { variant } = this.place, isRival = (/** @type {string} */ name) => this.plays.rivals.includes(name.slice(1));
+    if (value.startsWith("+")) return { player: "script", variant: value };
+    return { player: value || "me", variant: isRival(variant) ? "" : variant };
   }
 
   // -- the text --------------------------------------------------------------------------------------------------
@@ -281,20 +301,22 @@ class Studio {
 
   /** New scenarios: templates, and copies of shipped ones. */
   offer() {
-    const { templates = {}, shipped = [] } = this.offered ?? {};
-    const template = make("select", { "aria-label": "template" }, ...Object.entries(templates).map(([name, about]) => make("option", { value: name }, `${name}: ${about}`)));
+    /** @type {{heading: string, names: Record<string, string>}[]} */ const starts = this.offered?.starts ?? [];
+    const [templates, ...copies] = starts;
+    const option = ([name, about] = ["", ""]) => make("option", { value: name }, about ? `${name}: ${about}` : name);
+    const template = make("select", { "aria-label": "template" }, ...Object.entries(templates?.names ?? {}).map(option));
     const called = make("input", { value: "my_scenario", "aria-label": "name" });
-    const copy = make("select", { "aria-label": "shipped scenario" }, ...shipped.map((/** @type {string} */ name) => make("option", {}, name)));
+    const copy = make("select", { "aria-label": "scenario to copy" }, ...copies.map(({ heading, names }) => make("optgroup", { label: heading }, ...Object.entries(names).map(option))));
     const opened = async (/** @type {Reply} */ done) => {
       if (done.refused) return this.tell(done.refused);
       await this.list();
       await this.openFile(done.name);
     };
-    this.ask("Begin with a template, or with a copy of a shipped scenario. Both become files of this folder.", [
+    this.ask("Begin with a template, or with a copy of a scenario, its script and its tests. Both become files of this folder.", [
       ["Begin with the template", async () => opened(await this.line.ask("create", { template: template.value, called: called.value.trim() }))],
       ["Open a copy", async () => opened(await this.line.ask("copy", { shipped: copy.value }))],
       ["Close", () => {}],
-    ], make("label", {}, "Template ", template), make("label", {}, "Name ", called), make("label", {}, "Shipped ", copy));
+    ], make("label", {}, "Template ", template), make("label", {}, "Name ", called), make("label", {}, "Scenario ", copy));
   }
 
   /** Show the page about a code of findings. @param {string} code */
@@ -341,6 +363,10 @@ class Studio {
     this.writing.count("Findings", findings.length ? String(findings.length) : "", findings.some((/** @type {Reply} */ one) => one.error) ? "bad" : "open");
     if (findings.some((/** @type {Reply} */ one) => one.error)) this.writing.choose("Findings");
     this.stage.root.classList.toggle("stale", !drawn.episode);
+    if (drawn.plays) {
+      this.plays = drawn.plays;
+      this.offerPlayers();
+    }
     if (drawn.episode) {
       this.counts.forget();
       this.episode = null;
@@ -356,7 +382,7 @@ class Studio {
     this.seat.moments = begun.seats;
     this.counts.names = begun.rules;
     this.length = this.episode.length;
-    this.players.value = begun.player;
+    this.players.value = begun.player === "script" && this.plays.rivals.includes(begun.variant.slice(1)) ? begun.variant : begun.player;
     this.place = { room: begun.room, variant: begun.variant };
     this.seedField.value = String(begun.room.seed);
     this.roomField.value = String(begun.room.index ?? 0);
@@ -382,9 +408,9 @@ class Studio {
   }
 
   /** Begin an episode where the last one was, or elsewhere. */
-  async begin({ room, variant } = this.place) {
+  async begin(room = this.place.room, { player, variant } = this.chosen()) {
     this.pause();
-    const begun = await this.line.ask("begin", { room, variant, player: this.players.value || "me" });
+    const begun = await this.line.ask("begin", { room, variant, player });
     if (begun.refused) {
       this.tell(begun.refused);
       if (!begun.lost) this.players.value = "me";
@@ -397,7 +423,8 @@ class Studio {
 
   /** Begin in another room, without what was known of the last one. @param {Record<string, any>} room */
   another(room) {
-    this.begin({ room, variant: "" });
+    const { player, variant } = this.chosen();
+    this.begin(room, { player, variant: player === "script" && this.plays.rivals.includes(variant.slice(1)) ? variant : "" });
   }
 
   /** The next seed. */

@@ -127,7 +127,7 @@ def test_a_window_reads_plays_and_saves(client: Client, tmp_path: Path) -> None:
         window = Window(opened)
         listed = window.ask("list")
         assert listed["files"] == ["talkitout.yaml"]
-        assert "shipped:talkitout" in listed["runs"], "a trained agent to watch"
+        assert {"name": "shipped:talkitout", "scenario": "talkitout"} in listed["agents"]
         found = window.ask("read", name="talkitout.yaml")
         drawn = window.ask("draw", path="talkitout.yaml", text=found["text"], room={"seed": 3})
         assert drawn["episode"]["trace"]["scenario"] == "talkitout"

@@ -314,3 +314,15 @@ def test_an_episode_begins_again_where_it_began(session: Session) -> None:
     assert test_set["episode"] == "test episode 17"
     with pytest.raises(RefusalError, match="leave out the index or the test episode"):
         session.begin(Room(test_episode=1, index=1))
+
+
+def test_it_says_who_can_play(shy: tuple[Session, str], session: Session, path: Path) -> None:
+    assert shy[0].draw(shy[1], SHY)["plays"] == {"names": ["shy"], "script": False, "rivals": ["hasty"]}
+    copied = path.with_name("talkitout_2.yaml")
+    for file, names in ((path, ["talkitout"]), (copied, ["talkitout", "talkitout_2"])):
+        assert session.draw(str(file), path.read_text())["plays"]["names"] == names
+    assert session.draw(str(path), path.read_text())["plays"]["script"]
+    shy[0].begin(Room(), "script", "+hasty")
+    shy[0].auto()
+    with pytest.raises(RefusalError, match="has no script"):
+        shy[0].begin(Room(), "script")
