@@ -254,6 +254,9 @@ def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[
             *(f"* {rule(one)}" for one in (rules if isinstance(rules, list) else [rules])),
         ]
     yield ["## Outcome", "", "The first that holds ends the episode:", "", *_outcomes(data)]
+    if figures := loaded.scenario.published:
+        rows = [(one.who, one.did, f"{one.share:.0%}", str(one.n), one.source) for one in figures]
+        yield ["## Published", "", *table(("who", "what they did", "share", "of", "source"), rows)]
 
 
 def _cast(loaded: LoadedScenario) -> list[str]:

@@ -290,6 +290,9 @@ def _rival(trial: Trial, plan: PropertyPlan) -> Report:
     if trial.rooms.solved_by_idling.all():
         said = f"it rests on nothing: in all of {rooms_text(trial.effort.rooms)} {_OF_ITSELF}"
         return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
+    if trial.scripted is not None and trial.solved.mean() <= plan.share:
+        said = f"it rests on nothing: the skill does not help more than that; {said}"
+        return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
     verdict = Verdict.HOLDS if won.mean() <= plan.share + 1e-9 else Verdict.FAILS
     against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
     return Report(verdict, len(won), int((~won).sum()), 0, against, said, len(won))

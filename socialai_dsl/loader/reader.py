@@ -317,6 +317,8 @@ def _is_text(keys: list[str]) -> bool:
     match keys:
         case [*_, "frames", _, "start"] | [*_, "probes", _, "ask" | "answers"]:
             return True
+        case [*_, "published", "who" | "did" | "source"]:
+            return True
         case ["tests", _, "play", "do"] | ["tests", _, "play", "state", _]:
             return True
         case ["instructions", _] | ["set" | "add", "instructions"] | ["set" | "add", "instructions", _]:

@@ -756,6 +756,18 @@ class Parameter(Model):
     )
 
 
+class Published(Model):
+    """A figure that a study reports: the share of those it tested who did something."""
+
+    who: Prose = Field(
+        description="who was tested, and under which condition", examples=["children of 4 years"]
+    )
+    did: Prose = Field(description="what was counted", examples=["right about where Sally looks"])
+    share: Probability = Field(description="the share of them that did it")
+    n: int = Field(description="how many were tested", ge=1)
+    source: Prose = Field(description="where the figure is published")
+
+
 class Scenario(Model):
     """One environment: a room with objects, a cast that follows frames, and an outcome."""
 
@@ -835,6 +847,9 @@ class Scenario(Model):
         default_factory=dict,
         max_length=16,
         description="name: a strategy that lacks the skill, as a frame for the agent; `SCENARIO+name` plays it",
+    )
+    published: ListOf[Published] = Field(
+        (), description="figures of studies with people, which the data sheet shows; playing never reads them"
     )
     probes: dict[Word, Probe] = Field(
         default_factory=dict,

@@ -386,7 +386,7 @@ _STAND_INS: Final[dict[str, Data]] = {
 
 _INDIFFERENT: Final = frozenset(
     "scenario outcome room about notes skills instructions training_frames horizon earshot view kind kind_code audible "
-    "color facing reward id after chance once npcs image names own_voice canvas actions do".split()
+    "color facing reward id after chance once npcs image names own_voice canvas actions do published".split()
 )
 """Keys whose loss makes nothing else in the file wrong."""
 

@@ -143,3 +143,8 @@ def test_frames() -> None:
     assert steps == ["### `walk`", "", "* slots: `to: object`", "", "1. `do: go_to(to)`", "2. `say: Here`"]
     states = frame("sit", {"states": {"down": None, "up": {"first": {"when": "poked", "goto": "down"}}}})
     assert states[-2:] == ["| `down` | | `stay` |", "| `up` | `when: poked` → `goto: down` | `stay` |"]
+
+
+def test_a_page_shows_what_studies_with_people_report() -> None:
+    text = page("classics/helper_hinderer", socialai_dsl.load("classics/helper_hinderer"), None)
+    assert "| infants of 10 months | reached for the helper | 88% | 16 | Hamlin, Wynn & Bloom 2007 |" in text
