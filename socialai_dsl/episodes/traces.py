@@ -23,7 +23,7 @@ from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
-from socialai_dsl.semantics.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.traces.document import Outcome, Thought, Trace
 from socialai_dsl.traces.endings import endings_of
 from socialai_dsl.traces.state import cast_of
@@ -283,7 +283,7 @@ class TracedEpisode:
         actions = []
         for line in lines:
             try:
-                actions.append(self._env.encode_action(split_line(line.strip(), phrases.actions)))
+                actions.append(self._env.encode_action(phrases.act(line.strip())))
             except ValueError:
                 raise UsageError(f"do: {phrases.problem(line.strip())}") from None
         return ReplayedPolicy(actions)

@@ -10,7 +10,8 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
-from itertools import islice
+from itertools import islice, pairwise
+from math import gcd
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
@@ -593,10 +594,12 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         return ParseProblem("S207", "comparisons do not chain", offset, instead=_unchained(text, offset))
     if text.startswith("||", offset - 1):
         return _wrong_symbol(text, offset - 1)
-    if token.type == "WHERE":
-        return ParseProblem("S210", "`where` belongs in a place or inside pick(d in group where ...)", offset)
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
+    if (problem := _of_numbers(text, offset) or _of_groups(text, offset, token)) is not None:
+        return problem
+    if token.type == "WHERE":
+        return ParseProblem("S210", "`where` belongs in a place or inside pick(d in group where ...)", offset)
     hint: str | None = None
     words = None
     if token.type in ("IF", "ELSE"):
@@ -605,6 +608,63 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         words = next(found[0] for found in _SEVERAL.finditer(text) if found.start() <= offset < found.end())
         hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
     return ParseProblem("S210", f"did not expect `{token}` here", offset, hint, words)
+
+
+_UNITS = "cells? m steps? turns? rounds? s sec seconds? times? frames? pixels? px episodes?".replace(" ", "|")
+_UNIT = re.compile(rf"(?<![\w.])(\d+) *(?:{_UNITS})\b(?!\s*[.(])")
+"""A number with what it counts."""
+
+_WEIGHT = re.compile(r"(?<![\w.])(\d*)\.(\d+)(?=\s*\*)")
+"""A weight with decimals."""
+
+_LOOKING = re.compile(r"(\w+)\(\s*(\w+)\s+$")
+"""What stands before the second word of `any(d in doors ...)`."""
+
+
+def _of_numbers(text: str, offset: int) -> ParseProblem | None:
+    """The problem of a number with a unit or with decimals."""
+    for found in _UNIT.finditer(text):
+        if found.start() <= offset < found.end():
+            instead = Instead(*found.span(), found[1])
+            return ParseProblem(
+                "S210", f"`{found[0]}` is not a number", offset, "a number has no unit", instead=instead
+            )
+    decimal = next((f for f in re.finditer(r"\d*\.\d+", text) if f.start() <= offset < f.end()), None)
+    if decimal is None:
+        return None
+    message, weights = f"`{decimal[0]}` is not a whole number", list(_WEIGHT.finditer(text))
+    if not any(weight.start() == decimal.start() for weight in weights):
+        return ParseProblem("S210", message, decimal.start(), "numbers in expressions are whole")
+    if len(weights) <= text.count("|"):
+        return ParseProblem("S210", message, decimal.start(), "weights are whole, such as `2 * left | right`")
+    # The same proportions in whole numbers.
+    places = max(len(weight[2]) for weight in weights)
+    parts = [int(weight[1] + weight[2].ljust(places, "0")) for weight in weights]
+    parts = [part // max(1, gcd(*parts)) for part in parts]
+    start, end = weights[0].start(), weights[-1].end()
+    weighed = re.compile(r"\s*\*\s*[\w.]*").match(text, end)
+    assert weighed is not None, "internal: a weight stands before what it weighs"
+    pieces = [text[a.end() : b.start()] for a, b in pairwise(weights)]
+    scaled = "".join(f"{part}{piece}" for part, piece in zip(parts, [*pieces, weighed[0]], strict=True))
+    end = weighed.end()
+    return ParseProblem(
+        "S210", message, decimal.start(), "weights are whole", instead=Instead(start, end, scaled)
+    )
+
+
+def _of_groups(text: str, offset: int, token: Any) -> ParseProblem | None:
+    """The problem of `any(d of doors ...)`, or of `any(doors where ...)`."""
+    looking = _LOOKING.search(text[:offset])
+    if looking is None:
+        return None
+    if str(token) in ("of", "from", "among"):
+        instead = Instead(offset, offset + len(token), "in")
+        return ParseProblem("S210", f"did not expect `{token}` here", offset, instead=instead)
+    if token.type != "WHERE":
+        return None
+    group, letter = looking[2], looking[2][0]
+    hint = f"give one of the group a name: `{looking[1]}({letter} in {group} where {letter}. ...)`"
+    return ParseProblem("S210", f"nothing is said about one of `{group}`", offset, hint)
 
 
 _SEVERAL = re.compile(

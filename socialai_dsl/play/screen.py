@@ -21,7 +21,7 @@ from socialai_dsl.play.game import FinishedEpisode, Game, Sight
 from socialai_dsl.render.canvas import INK
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.render.tiles import PALETTE
-from socialai_dsl.semantics.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases
 
 Episodes = Callable[[int], tuple[str, dict[str, Any]] | None]
 """Number, counted from 0 -> title and arguments of `env.reset`; None after the last one."""
@@ -160,7 +160,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         """Do and say what was typed."""
         line = event.value.strip()
         if line:
-            self.play(*split_line(line, self._game.phrases.actions))
+            self.play(*self._game.phrases.act(line))
         else:
             self.set_focus(None)
 

@@ -599,8 +599,11 @@ class _Report:
         expected = expectation(annotation_at(self._model, finding.path))
         got = _kind_of(finding.value)
         key = finding.key
+        hint = self._cure(finding, expected)
+        if isinstance(finding.value, float) and expected == "an expression":
+            expected = "a whole number or an expression"
         what = f"`{key}` is {expected}" if key else f"{expected} is expected"
-        self._bag.error("S104", f"{what}, here is {got}", span, hint=self._cure(finding, expected))
+        self._bag.error("S104", f"{what}, here is {got}", span, hint=hint)
 
     def _as_share(self, finding: _Finding) -> cures.Hint:
         """What a number in per cent is where a share is expected."""
@@ -625,9 +628,30 @@ class _Report:
             return "conditions are joined with `and` or `or`, alternatives are written a | b"
         if isinstance(value, str) and (assigned := _ASSIGNMENT.fullmatch(value)) and "mapping" in expected:
             return self._instead(path, f"{{{assigned[1]}: {assigned[2]}}}")
+        if isinstance(value, float) and expected in ("an expression", "a whole number"):
+            percent = f"{value * 100:g}"
+            if self._is_percent(path) and 0 <= value <= 1 and percent.isdecimal():
+                return self._instead(path, percent, "it is per cent")
+            return "numbers in expressions are whole" if expected == "an expression" else None
+        if isinstance(value, str) and "number" in expected and (found := _UNIT.fullmatch(value)):
+            number = found[1]
+            if "whole" in expected and not number.isdecimal():
+                return None
+            if found[2] == "%" and expected == "a number":
+                return self._instead(path, f"{float(number) / 100:g}", "it is a share, not per cent")
+            return self._instead(path, number, "a number has no unit")
         if isinstance(value, list | dict) and expected in ("a text", "an expression"):
             return self._quoted(path, "brackets" if isinstance(value, list) else "braces or a colon")
         return None
+
+    def _is_percent(self, path: DataPath) -> bool:
+        """Whether the number at a path is per cent of something."""
+        owner = model_at(self._model, path[:-1]) if path else None
+        fields = owner.model_fields if owner is not None else {}
+        return any(
+            (field.alias or name) == path[-1] and (field.description or "").startswith("per cent")
+            for name, field in fields.items()
+        )
 
     def _quoted(self, path: DataPath, what: str) -> cures.Hint:
         """The proposal to quote what is written as a list or mapping in one line."""
@@ -687,6 +711,9 @@ def _length(finding: _Finding) -> str:
 
 
 _RANGES: Final = ("size", "width", "height", "range")
+_UNIT: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]+|%)\s*")
+"""A number with what it counts."""
+
 _ASSIGNMENT: Final = re.compile(r"\s*(\w+)\s*=\s*([^=].*)")
 
 

@@ -467,8 +467,16 @@ class _Planner:
         )
         if step.do is not None and step.until is None and step.for_ is None and endless:
             findings = self.resolver.findings
-            message = f"`{step.do}` never ends by itself: add `until:` or `for:`"
-            findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)))
+            message = f"`{step.do}` never ends by itself"
+            hint: cures.Hint = "add `until:` or `for:`"
+            if doing is not None and doing.name == "stay" and (step.say or step.set or step.cause):
+                edit = cures.deleted(findings.places, (*path, "do"))
+                hint = cures.propose(
+                    f"delete `do: {step.do}`", edit, also="a step without it stays for one turn"
+                )
+            elif doing is not None and doing.name == "stay":
+                hint = cures.add("for: 1", cures.added(findings.places, path, "for: 1"), also="or `until:`")
+            findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)), hint=hint)
         return StepPlan(
             name=name,
             state=step.state,

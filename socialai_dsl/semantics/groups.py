@@ -281,6 +281,15 @@ def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> 
         )
     if node.var in resolver.words.reserved or node.var in resolver.symbols.declared:
         message = f"the variable `{node.var}` has a name that means something already"
+        if isinstance(node.group, ast.Name) and is_group(resolver, ast.Name(node.var), scope):
+            swapped = replace(node, var=node.group.id, group=ast.Name(node.var))
+            if resolver.means_nothing(node.group.id, scope):
+                message = (
+                    f"`{node.group.id}` is no group, and `{node.var}` is one: the variable stands before `in`"
+                )
+                raise resolver.fail(
+                    "S213", message, node, scope, hint=resolver.instead(ast.unparse(swapped), node, scope)
+                )
         raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
     if node.name == "nearest" and node.to is None:
         raise resolver.fail("S211", "`nearest` needs `to`: nearest(d in doors to agent)", node, scope)

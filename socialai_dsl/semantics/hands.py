@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from socialai_dsl import cures
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
@@ -52,10 +53,17 @@ def carries(resolver: Resolver, who: Term, what: ast.Expr, node: ast.Expr, scope
     return _in_hands(resolver, who, thing)
 
 
+def _may_be_carried(resolver: Resolver, thing: Term) -> bool:
+    known = carryable(resolver)
+    return thing.type.kind == "entity" and any(thing.type.low <= n <= thing.type.high for n in known)
+
+
 def check_carried(resolver: Resolver, thing: Term, node: ast.Expr, scope: Scope) -> None:
     """Report what nobody can carry."""
-    known = carryable(resolver)
-    if thing.type.kind != "entity" or not any(thing.type.low <= n <= thing.type.high for n in known):
+    if is_member(resolver, thing):
+        message = f"`{quoted(node)}` is somebody, and only things are carried"
+        raise resolver.fail("S204", message, node, scope)
+    if not _may_be_carried(resolver, thing):
         raise resolver.fail("S204", f"`{quoted(node)}` cannot be carried", node, scope, hint=CARRYABLE)
 
 
@@ -96,6 +104,15 @@ def check_arguments(
     resolver: Resolver, name: str, terms: Sequence[Term], nodes: Sequence[ast.Expr], scope: Scope
 ) -> None:
     """Report what cannot be fetched, given or brought, and to whom or where."""
+    if len(terms) == 2 and not _may_be_carried(resolver, terms[0]) and _may_be_carried(resolver, terms[1]):
+        message = f"`{quoted(nodes[0])}` cannot be carried, and `{quoted(nodes[1])}` can"
+        swapped = f"{name}({quoted(nodes[1])}, {quoted(nodes[0])})"
+        edits = (
+            resolver.findings.instead(scope.path, nodes[0], quoted(nodes[1])),
+            resolver.findings.instead(scope.path, nodes[1], quoted(nodes[0])),
+        )
+        hint = cures.propose(f"write `{swapped}`", *edits)
+        raise resolver.fail("S204", message, nodes[0], scope, hint=hint)
     check_carried(resolver, terms[0], nodes[0], scope)
     for where, node in zip(terms[1:], nodes[1:], strict=True):
         _check_recipient(resolver, name, where, node, scope)

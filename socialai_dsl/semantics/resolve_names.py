@@ -90,6 +90,16 @@ def _unknown_attribute(
         )
     if name == "believes" and isinstance(node, ast.Attribute):
         return resolver.fail("S211", object_facts.unnamed(quoted(node.subject)), node, scope)
+    if isinstance(node, ast.Attribute) and isinstance(node.subject, ast.Name):
+        played = resolver.frames.get(node.subject.id)
+        around = resolver.around(node)
+        if played is not None and name in (played.model.states or {}):
+            hint = resolver.instead(f"{node.subject.id}.is({name})", node, scope, "which is a state")
+            return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, hint=hint)
+        if name in ("state", "in_state") and isinstance(around, ast.Compare):
+            for side in (around.left, around.right):
+                if isinstance(side, ast.Name) and (state := _as_state(resolver, side, scope)) is not None:
+                    return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, hint=state)
     if (meant := synonym_of(resolver, name, node, scope)) is not None:
         return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, hint=meant)
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
@@ -386,6 +396,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
             "in expressions a member of the cast goes by its key",
         )
         return resolver.no_such(word, message, node, scope, suggestion=called, hint=cure)
+    if (state := _as_state(resolver, node, scope)) is not None:
+        return resolver.no_such(word, f"unknown name `{word}`", node, scope, hint=state)
     near, place = suggestion(resolver, word, expected, scope)
     message = f"unknown name `{word}`"
     hint: cures.Hint = None
@@ -401,6 +413,11 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         hint = _quoting_nouns(resolver, whole, scope)
     elif near is None and expected is not None and expected.kind == "int" and not expected.words:
         message = f"unknown name `{word}`, where a number is expected"
+    elif near is None and isinstance(whole, str) and whole[node.at - 1 : node.end + 1] == f"<{word}>":
+        edit = cures.over_part(resolver.findings.places, scope.path, node.at - 1, node.end + 1, word)
+        hint = cures.propose(
+            f"if it is no value but part of the text, write `{word}` without `<` and `>`", edit
+        )
     elif near is None and expected is None and not resolver.is_subject(node):
         text = as_text(word, whole)
         edit = resolver.findings.instead(scope.path, node, f'"{word}"')
@@ -408,6 +425,27 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
             edit = cures.over_value(resolver.findings.places, scope.path, text)
         hint = cures.propose(f"if a text is meant, quote it: {text}", edit)
     return resolver.no_such(word, message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
+
+
+def _as_state(resolver: Resolver, node: ast.Name, scope: Scope) -> cures.Hint:
+    """The proposal to ask for the state of a member, where what is compared or asked for is called like one."""
+    owners = [key for key, frame in resolver.frames.items() if node.id in (frame.model.states or {})]
+    if not owners:
+        return None
+    around = resolver.around(node)
+    asked: ast.Expr | None = None
+    negation = ""
+    match around:
+        case ast.Call(subject=subject, args=(only,)) if only is node:
+            asked = subject
+        case ast.Compare(op="==" | "!=" as op, left=left, right=right):
+            asked = right if left is node else left
+            negation = "not " if op == "!=" else ""
+    if isinstance(asked, ast.Attribute) and asked.name in ("state", "in_state"):
+        asked = asked.subject
+    if around is not None and isinstance(asked, ast.Name) and asked.id in owners:
+        return resolver.instead(f"{negation}{asked.id}.is({node.id})", around, scope)
+    return f"`{node.id}` is a state of `{owners[0]}`: `{owners[0]}.is({node.id})`"
 
 
 def _quoting_nouns(resolver: Resolver, whole: Data, scope: Scope) -> cures.Cure | str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
@@ -81,6 +82,7 @@ class Utterances:
         self.said_by: dict[str, dict[str, None]] = {}
         self.sentences = sentences
         self._by_normal: dict[str, list[tuple[int, str]]] = {}
+        self._unclear: list[tuple[str | None, re.Pattern[str]]] = []
 
     @cached_property
     def _pairs(self) -> dict[str, set[tuple[int, int]]]:
@@ -97,6 +99,19 @@ class Utterances:
             if text not in self.npc_texts:
                 self._by_normal.setdefault(normal(text), []).append((len(self.npc_texts), text))
             self.npc_texts[text] = own[text] = None
+
+    def add_unclear(self, member: str | None, text: ast.Text | None) -> None:
+        """Make known that a member says a text in which something was reported that means nothing; None: any text."""
+        parts = text.parts if text is not None else (None,)
+        written = "".join(re.escape(normal(part)) if isinstance(part, str) else ".*" for part in parts)
+        self._unclear.append((member, re.compile(written.replace("\\ ", r"\s*"))))
+
+    def may_be_said(self, said: str, members: Container[str] | None = None) -> bool:
+        """Whether one of some members, or of all, may say a text where what it says is not clear for another reason."""
+        return any(
+            (members is None or member in members) and pattern.fullmatch(normal(said))
+            for member, pattern in self._unclear
+        )
 
     def match(self, said: str) -> frozenset[tuple[int, int]]:
         """The pairs of template and filling that a text is, `<slot>` standing for all that the slot can be."""
@@ -643,6 +658,10 @@ class Resolver(ABC):
     def instead(self, text: str, node: ast.Expr, scope: Scope, also: str = "") -> cures.Cure | str:
         """The proposal to write something else in the place of a part of an expression."""
         return cures.write(text, self.findings.instead(scope.path, node, text), also)
+
+    def around(self, node: ast.Expr) -> ast.Expr | None:
+        """The expression that a part of it, which is being resolved, is right in."""
+        return next((whole for whole, _ in reversed(self._within) if node in whole.children()), None)
 
     def is_subject(self, node: ast.Expr) -> bool:
         """Whether something is asked of what a name stands for that is being resolved: it is no text then."""

@@ -44,6 +44,7 @@ from socialai_dsl.semantics.terms import (
     Test,
     World,
     chosen,
+    draws,
     walk,
 )
 from socialai_dsl.semantics.words import PLACES
@@ -221,8 +222,9 @@ def _built(resolver: Resolver) -> Iterator[tuple[ObjectType, Region, Span]]:
             type_ = resolver.symbols.types.get(name)
             if type_ is None:
                 near = did_you_mean(name, resolver.symbols.types)
+                hint = None if near else "what is built is a type with its place: `{wall: row(3)}`"
                 span = findings.places.key_span(path)
-                findings.error("S309", f"unknown object type `{name}`", span, suggestion=near)
+                findings.error("S309", f"unknown object type `{name}`", span, suggestion=near, hint=hint)
                 continue
             with surviving():
                 yield from _built_regions(resolver, path, raw, type_)
@@ -233,8 +235,11 @@ def _built_regions(
 ) -> Iterator[tuple[ObjectType, Region, Span]]:
     findings, scope = resolver.findings, reset_scope(path)
     node = findings.expression(path, raw)
+    if isinstance(node, ast.FilteredRegion):
+        hint = "build the rest by several places: `row(3) | column(2)`, or by `rect(x0, y0, x1, y1)`"
+        raise findings.fail("S204", "what is built has no `where`", findings.at(path), hint=hint)
     for part in _regions(resolver, node, scope):
-        reads = [t for t in walk(part.args) if not isinstance(t, World) and hasattr(t, "path")]
+        reads = [t for t in walk(part.args) if not isinstance(t, World) and (hasattr(t, "path") or draws(t))]
         if reads or part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args):
             message = "what is built into the room depends on its size alone"
             hint = "use W and H, and put what is drawn in `objects`"

@@ -250,6 +250,8 @@ def _report_unsayable(
 ) -> None:
     findings = resolver.findings
     said, word = unsayable[0]
+    if from_npcs and resolver.utterances.may_be_said(said):
+        raise FailedError
     if values and some:
         node, value = values[0]
         name = quoted(node) if not isinstance(node, str) else node
@@ -287,8 +289,18 @@ def _report_unsayable(
 def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
     """The line of a `say:`: pieces and values. The agent can say only utterances of its grammar."""
     findings = resolver.findings
-    text = findings.text(path, raw)
-    span = findings.places.whole_span(path)
+    text: ast.Text | None = None
+    try:
+        text = findings.text(path, raw)
+        return _line(resolver, path, text, scope)
+    except FailedError:
+        if scope.member != "agent":
+            resolver.utterances.add_unclear(scope.member, text)
+        raise
+
+
+def _line(resolver: Resolver, path: DataPath, text: ast.Text, scope: Scope) -> Line:
+    span = resolver.findings.places.whole_span(path)
     only = text.parts[0] if len(text.parts) == 1 else None
     slot = _slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
     if slot is not None and len(slot) == 1:
@@ -567,6 +579,9 @@ def _sayable(resolver: Resolver, members: Iterable[str]) -> list[str]:
 
 
 def _never_said(resolver: Resolver, said: str, members: Iterable[str], span: Span) -> FailedError:
+    members = list(members)
+    if resolver.utterances.may_be_said(said.strip('"'), members):
+        return FailedError()
     texts, names = _sayable(resolver, members), [f"`{member}`" for member in members]
     near = did_you_mean(said.strip('"'), texts)
     hint = "what somebody can say stands in the `say` of its frame"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.vocabulary import PRIMITIVES, Sentences
+from socialai_dsl.vocabulary import PRIMITIVES, Sentences, normal
 
 STANDING: Final = (".", "none")
 """What is typed for standing still."""
@@ -50,6 +50,14 @@ class Phrases:
 
     actions: Sequence[str]
     grammar: Sentences
+
+    def act(self, line: str) -> tuple[str | None, str | None]:
+        """The movement and the sentence that are typed, the sentence as the grammar writes what is heard alike."""
+        movement, said = split_line(line, self.actions)
+        alike = (
+            sentence for sentence in self.sentences() if said is not None and normal(sentence) == normal(said)
+        )
+        return movement, next(alike, said)
 
     def sentences(self) -> list[str]:
         """Each sentence once, by template, then by what stands in its slots."""

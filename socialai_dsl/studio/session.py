@@ -29,7 +29,7 @@ from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.loader.resolved import taken_apart
 from socialai_dsl.semantics.plans import PropertyPlan
-from socialai_dsl.semantics.typed import Phrases, split_line
+from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.source import Source, Span
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
 from socialai_dsl.studio.messages import Room, Shown
@@ -157,7 +157,7 @@ class Session:
         """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
         stage, _ = self._playing()
         if line is not None:
-            movement, sentence = split_line(line.strip(), self._phrases.actions)
+            movement, sentence = self._phrases.act(line.strip())
         try:
             action = stage.env.encode_action((movement, sentence))
         except ValueError:

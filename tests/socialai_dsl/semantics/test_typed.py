@@ -13,6 +13,19 @@ PHRASES = Phrases(ACTIONS, GRAMMAR)
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
+        ("where is THE exit?", (None, "Where is the exit")),
+        ("left  hello!", ("left", "Hello")),
+        ("left", ("left", None)),
+        ("hallo", (None, "hallo")),
+    ],
+)
+def test_a_sentence_is_read_as_it_would_be_heard(line: str, expected: tuple[str | None, str | None]) -> None:
+    assert PHRASES.act(line) == expected
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
         ("", (None, None)),
         ("left", ("left", None)),
         ("f", ("forward", None)),
