@@ -147,6 +147,13 @@ class Check(_Message):
     text: str
 
 
+class Look(_Message):
+    """Ask what a member of the cast sees now."""
+
+    do: Literal["look"]
+    who: _Word
+
+
 class Test(_Message):
     """Play the tests of a text that is to stand in the file `path`, and those in the file beside it."""
 
@@ -168,7 +175,20 @@ class WriteTest(_Message):
 
 
 _GameQuestion = (
-    Draw | Begin | Show | Act | Auto | Back | Place | Layout | WriteLayout | Replay | Check | Test | WriteTest
+    Draw
+    | Begin
+    | Show
+    | Act
+    | Auto
+    | Back
+    | Place
+    | Look
+    | Layout
+    | WriteLayout
+    | Replay
+    | Check
+    | Test
+    | WriteTest
 )
 Question = Annotated[_GameQuestion, Field(discriminator="do")]
 QUESTIONS: Final[TypeAdapter[Question]] = TypeAdapter(Question)
@@ -432,6 +452,20 @@ class WentBack(_Message):
     length: int
 
 
+class Looked(_Message):
+    """What a member of the cast sees.
+
+    Attributes:
+        step: of the moment. side: of its view square. cells: those it sees, numbered row by row as in the trace.
+    """
+
+    do: Literal["look"]
+    who: str
+    step: int
+    side: int
+    cells: list[int]
+
+
 class LayoutOf(_Message):
     """The room as a layout."""
 
@@ -491,6 +525,7 @@ Answer = Annotated[
     | Begun
     | Stepped
     | WentBack
+    | Looked
     | LayoutOf
     | WrittenLayout
     | Page

@@ -17,6 +17,7 @@ from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity, printable
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.gaze import Gaze
 from socialai_dsl.envs.options import reset_arguments
 from socialai_dsl.episodes.play import AGENT, OneEpisode, Rooms, play
 from socialai_dsl.episodes.policies import Policy, RandomPolicy, ReplayedPolicy
@@ -65,6 +66,8 @@ class Session:
         self._text_view: TextView | None = None
         self._briefing = NO_BRIEFING
         self._player, self._variant, self._room = "me", "", Room()
+        self._loaded: Loaded | None = None
+        self._gaze: tuple[int, int, Gaze] | None = None
         self._policy: Policy = RandomPolicy(())
         self._prepared = False
 
@@ -222,6 +225,27 @@ class Session:
         known = self._room.model_copy(update={"layout": layout})
         return self.begin(known, self._player, self._variant)
 
+    def look(self, who: str) -> Reply:
+        """The cells that a member of the cast sees now."""
+        stage, tracing = self._playing()
+        env, checked = stage.env, stage.env.scenario
+        names = [str(name) for name in env.playing.entities]
+        number = names.index(who) if who in names else 0
+        if checked.entities[number].role != "npc":
+            raise RefusalError(f"there is nobody called {who!r} in the cast")
+        if self._gaze is None or self._gaze[:2] != (id(checked), number):
+            assert self._loaded is not None, "internal: what is played was loaded"
+            self._gaze = id(checked), number, Gaze(self._loaded, checked, number)
+        *_, gaze = self._gaze
+        reset = reset_arguments(**self._room.model_dump())
+        images = [moment.observations[AGENT]["image"][0] for moment in stage.moments]
+        gaze.begin(reset.get("seed"), reset["options"], images[0])
+        for moment, image in zip(tracing.tracer.moments[1:], images[1:], strict=True):
+            gaze.follow(np.array(moment.action, np.int64), image)
+        width = env.describe()["room"]["width"]
+        cells = sorted(y * width + x for x, y in gaze.cells(begins=stage.steps == 0) if x < width)
+        return {"who": who, "step": stage.steps, "side": checked.entities[number].view, "cells": cells}
+
     def layout(self) -> Reply:
         """The room as it is now, as a layout that the commands take."""
         stage, _ = self._playing()
@@ -255,7 +279,7 @@ class Session:
 
     def check(self, path: str, text: str) -> Reply:
         """What `socialai check` finds of a text."""
-        from socialai_dsl.analysis.check import check_scenario
+        from socialai_dsl.analysis.check import check_scenario, compile_engine
         from socialai_dsl.analysis.effort import Clock, Effort
 
         own, texts = display_name(Path(path)), _texts(path, text)
@@ -265,6 +289,7 @@ class Session:
             return {"claims": [], "findings": [_finding(one, own) for one in error.diagnostics], "lines": []}
         if not isinstance(loaded, LoadedScenario):
             raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
+        compile_engine()  # before the time begins
         effort = Effort(100, 0, clock=Clock(_CHECK_SECONDS, lambda said: None))
         report = check_scenario(loaded, path, effort, texts=texts)
         report.scenario = own
@@ -319,6 +344,7 @@ class Session:
 
     def _use(self, loaded: Loaded) -> None:
         """Play this from now on."""
+        self._loaded, self._gaze = loaded, None
         program = compile_loaded(loaded)
         env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
         self._phrases = Phrases(program.actions, program.sentences)
@@ -394,6 +420,7 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "auto": Session.auto,
     "back": Session.back,
     "place": Session.place,
+    "look": Session.look,
     "layout": Session.layout,
     "write_layout": Session.write_layout,
     "replay": Session.replay,

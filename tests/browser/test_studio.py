@@ -517,6 +517,36 @@ def test_a_failing_test_opens_at_its_step_and_play_becomes_a_test(shy: Page, fol
     assert first.removesuffix("\n") in beside.read_text()
 
 
+def test_the_view_of_a_member_of_the_cast_is_shown(shy: Page) -> None:
+    views, words = shy.get_by_label("whose view"), shy.locator(".sight p")
+    sight, stage = shy.locator(".sight canvas"), shy.locator(".stage canvas")
+    pixels = "one => one.toDataURL()"
+    assert "the agent's own view" in (sight.get_attribute("aria-label") or "")
+    of_agent = sight.evaluate(pixels), stage.evaluate(pixels)
+    views.select_option("guide")
+    words.filter(has_text="guide sees door.").wait_for()
+    assert stage.evaluate(pixels) != of_agent[1], "what it sees is marked in the room"
+    shy.locator(".message").click()
+    shy.keyboard.press("ArrowUp")
+    reach(shy, 1)
+    words.filter(has_text="guide sees agent, door.").wait_for()
+    # The guide, which looks left, has the agent straight ahead and the door to its right.
+
+    def cell(column: int, row: int) -> str:
+        place = f"{32 * column + 4}, {32 * row + 4}, 24, 24"
+        return str(sight.evaluate(f"one => [...one.getContext('2d').getImageData({place}).data].join()"))
+
+    floor = cell(3, 5)
+    assert cell(3, 3) != floor
+    assert cell(6, 4) != floor
+    assert cell(4, 5) == floor
+    shy.keyboard.press("u")
+    reach(shy, 0)
+    words.filter(has_text="guide sees door.").wait_for()
+    views.select_option("the agent")
+    until(shy, lambda: (sight.evaluate(pixels), stage.evaluate(pixels)) == of_agent)
+
+
 def test_the_wizard_is_dragged(studio: Page) -> None:
     begin(studio, SEED)
     (x, y), free = place(studio, "wizard"), free_cell(studio)

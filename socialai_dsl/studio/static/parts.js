@@ -6,7 +6,8 @@ import { NPC } from "./tiles.js";
 
 /** @typedef {import("./trace.js").Episode} Episode */
 
-const MARBLE = 16;
+const MARBLE = 16, UP = 3, VIEW = 7;
+const AGENT = "the agent";
 
 /** All rules with how often they have fired, in this episode and in all since the text was changed. */
 export class Counts {
@@ -87,5 +88,79 @@ export class Seat {
     drawPicture(this.canvas, observed(view, moment.agent[2], compass), { tile: 64 });
     this.told.textContent = told;
     this.seen.textContent = seen;
+  }
+}
+
+/** @typedef {{who: string, step: number, side: number, cells: number[]}} Looked */
+
+/** What a member of the cast sees, turned so that it looks up; what it does not see is dark.
+ * @param {import("./trace.js").Picture} room @param {[number, number]} at where it is @param {number} facing
+ * @param {Looked} looked @returns {import("./trace.js").Picture} */
+function viewOf(room, [x, y], facing, { side, cells }) {
+  const [alongX, alongY] = [[1, 0], [0, 1], [-1, 0], [0, -1]][facing], half = Math.floor(side / 2), width = 2 * half + 1;
+  const turned = (/** @type {number} */ direction) => (direction + UP - facing + 4) % 4, seen = new Set(cells);
+  /** @type {import("./trace.js").Picture} */
+  const view = { width, height: side, cells: [], agent: [-1, -1, 0], below: new Map(), gestures: new Map(), held: new Map(), marks: new Map(), tinted: false };
+  for (let k = 0; k < width * side; k++) {
+    const ahead = side - 1 - Math.floor(k / width), right = (k % width) - half;
+    const column = x + ahead * alongX - right * alongY, row = y + ahead * alongY + right * alongX, cell = row * room.width + column;
+    const inside = column >= 0 && row >= 0 && column < room.width && row < room.height && seen.has(cell);
+    const [type, colour, status, drawn] = inside ? room.cells[cell] : [0, 0, 0, 0];
+    view.cells.push([type, colour, status, type === NPC || type === MARBLE ? turned(drawn) : drawn]);
+    if (!inside) continue;
+    if (column === room.agent[0] && row === room.agent[1]) view.agent = [k % width, Math.floor(k / width), turned(room.agent[2])];
+    for (const part of /** @type {const} */ (["below", "held", "marks"])) {
+      const one = room[part].get(cell);
+      if (one !== undefined) /** @type {Map<number, any>} */ (view[part]).set(k, one);
+    }
+    const gesture = room.gestures.get(cell);
+    if (gesture) {
+      const { pointing, at } = gesture, [right, down] = at?.length ? at : [0, 0];
+      view.gestures.set(k, { ...gesture, pointing: pointing < 0 ? pointing : turned(pointing),
+        at: at?.length ? [down * alongX - right * alongY, -(right * alongX + down * alongY)] : at });
+    }
+  }
+  return view;
+}
+
+/** What somebody sees: the agent, as it is observed, or a member of the cast. */
+export class Views {
+  /** @param {() => void} changed told when somebody else's view is to be shown */
+  constructor(changed) {
+    this.who = make("select", { "aria-label": "whose view", title: "whose view this is, and is marked in the room", onchange: changed });
+    this.canvas = make("canvas", { role: "img" });
+    this.words = make("p", { class: "quiet" });
+    this.root = panel("What somebody sees", "sight", this.who, this.canvas, this.words);
+    /** @type {Looked | null} what the chosen member of the cast sees */ this.looked = null;
+  }
+
+  /** The member of the cast whose view is shown; null for the agent's. */
+  get member() {
+    return this.who.value && this.who.value !== AGENT ? this.who.value : null;
+  }
+
+  /** @param {Episode} episode @param {number} step */
+  show(episode, step) {
+    const scene = episode.scenes[step], { member } = this, names = [AGENT, ...scene.cast.map(({ key }) => key)];
+    if (names.join() !== [...this.who.options].map(({ value }) => value).join())
+      this.who.replaceChildren(...names.map((name) => make("option", { value: name, selected: name === member }, name)));
+    if (!this.member) {
+      this.looked = null;
+      drawPicture(this.canvas, scene.view, { tile: 32 });
+      this.canvas.setAttribute("aria-label", "the agent's own view, 7 by 7 cells; the agent looks up");
+      this.words.textContent = "";
+      return;
+    }
+    const { looked } = this;
+    if (!looked || looked.who !== this.member || looked.step !== step) return; // it is asked for
+    const at = episode.place(scene, looked.who), facing = ["right", "down", "left", "up"].indexOf(scene.state[`${looked.who}.facing`]);
+    this.canvas.hidden = !at;
+    if (at) drawPicture(this.canvas, viewOf(scene.room, at, facing, looked), { tile: Math.floor((32 * VIEW) / Math.max(VIEW, looked.side)) });
+    const cells = new Set(looked.cells);
+    const things = Object.keys(scene.state).filter((address) => address.endsWith(".at") && scene.state[address] && address !== `${looked.who}.at`)
+      .filter((address) => cells.has(scene.state[address][1] * scene.room.width + scene.state[address][0])).map((address) => address.slice(0, -".at".length));
+    const sees = at ? `${looked.who} sees ${things.join(", ") || "nobody and nothing"}.` : `${looked.who} is not in the room.`;
+    this.words.textContent = sees;
+    this.canvas.setAttribute("aria-label", `the view of ${looked.who}, which looks up. ${sees}`);
   }
 }

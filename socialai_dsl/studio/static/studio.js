@@ -2,10 +2,10 @@
 /** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
 import { make } from "./dom.js";
 import { Editor } from "./editor.js";
-import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
+import { Cast, Mind, Rules, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { claimItems, findingItems, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
-import { Counts, Seat } from "./parts.js";
+import { Counts, Seat, Views } from "./parts.js";
 import { Episode, slotsOf } from "./trace.js";
 import { Writing } from "./writing.js";
 
@@ -33,6 +33,8 @@ class Studio {
     /** @type {Record<string, ReturnType<typeof setTimeout>>} */ this.later = {};
     this.drawing = false;
     this.again = false;
+    this.gazing = false;
+    /** @type {Episode | null} the episode of which it is known what a member of the cast sees */ this.gazed = null;
 
     const goTo = (/** @type {string} */ at) => this.editorAt(at);
     /** @type {import("./found.js").Ways} */
@@ -44,7 +46,8 @@ class Studio {
     this.stage = new Stage();
     this.counts = new Counts(goTo);
     this.seat = new Seat();
-    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: new Sight(), counts: this.counts, mind: new Mind((step) => this.back(step)) };
+    this.views = new Views(() => this.show());
+    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: this.views, counts: this.counts, mind: new Mind((step) => this.back(step)) };
     this.parts = [this.stage, this.seat, ...Object.values(parts)];
     this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
     this.state = make("output", { class: "quiet", "aria-live": "polite" });
@@ -593,11 +596,12 @@ class Studio {
   async check() {
     const done = await this.find("Claims", this.claims, "check", "checking, which takes up to 20 seconds …");
     if (!done) return;
-    const open = done.claims.filter((/** @type {import("./found.js").Claim} */ one) => one.verdict !== "holds");
+    /** @type {import("./found.js").Claim[]} */ const claims = done.claims, open = claims.filter((one) => one.verdict !== "holds");
+    open.sort((a, b) => Number(b.verdict === "fails") - Number(a.verdict === "fails"));
     this.claims.replaceChildren(
-      make("ul", { "aria-label": "claims" }, ...claimItems(done.claims, this.ways), ...findingItems(done.findings, this.ways)),
+      make("ul", { "aria-label": "claims" }, ...claimItems([...open, ...claims.filter((one) => one.verdict === "holds")], this.ways), ...findingItems(done.findings, this.ways)),
       ...done.lines.map((/** @type {string} */ line) => make("p", { class: "quiet" }, line)));
-    this.judge("Claims", done.claims, open.length);
+    this.judge("Claims", claims, open);
   }
 
   /** Play the tests of the text. */
@@ -606,7 +610,7 @@ class Studio {
     if (!done) return;
     const failed = done.tests.filter((/** @type {import("./found.js").TestResult} */ one) => !one.passes);
     this.tests.replaceChildren(make("ul", { "aria-label": "tests" }, ...testItems([...failed, ...done.tests.filter((/** @type {Reply} */ one) => one.passes)], this.ways), ...findingItems(done.findings, this.ways)));
-    this.judge("Tests", done.tests, failed.length);
+    this.judge("Tests", done.tests, failed);
   }
 
   /** Ask what is found of the text, and show in a tab that it is looked for.
@@ -624,11 +628,14 @@ class Studio {
   }
 
   /** Show verdicts behind the lines that they are about, and on the tab how many are not as they should be.
-   * @param {string} tab @param {(import("./found.js").Claim | import("./found.js").TestResult)[]} found @param {number} open */
+   * @param {string} tab
+   * @typedef {(import("./found.js").Claim | import("./found.js").TestResult)[]} Judged
+   * @param {Judged} found @param {Judged} open those that are not as they should be */
   judge(tab, found, open) {
     this.verdicts[tab] = found.filter((one) => !one.file).map((one) => ({ line: one.line, ...verdictOf(one) }));
     this.editor.judge(Object.values(this.verdicts).flat());
-    this.writing.count(tab, found.length ? (open ? `${open} of ${found.length}` : "✓") : "", open ? "bad" : "good");
+    const look = open.some((one) => verdictOf(one).kind === "bad") ? "bad" : open.length ? "open" : "good";
+    this.writing.count(tab, found.length ? (open.length ? `${open.length} of ${found.length}` : "✓") : "", look);
   }
 
   /** Verdicts are about the text before a change. */
@@ -767,7 +774,24 @@ class Studio {
     this.count.textContent = `step ${length}${seated ? "" : ` · reward ${episode.scenes[length].reward.toFixed(3)}`}`;
     if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${seated ? (ended.success ? "success" : "no success") : outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
+    if (!this.views.member) this.stage.seen = undefined;
     for (const part of this.parts) part.show(episode, length);
+    this.gaze();
+  }
+
+  /** Ask what the member of the cast sees whose view is to be shown, unless that is known. @returns {Promise<void>} */
+  async gaze() {
+    const { episode, length, views } = this, { member } = views;
+    if (!member || this.gazing || (views.looked?.who === member && views.looked.step === length && this.gazed === episode)) return;
+    this.gazing = true;
+    const found = await this.line.ask("look", { who: member });
+    this.gazing = false;
+    if (episode !== this.episode || length !== this.length || member !== views.member) return this.gaze();
+    if (found.refused) return this.tell(found.refused);
+    this.gazed = episode;
+    views.looked = /** @type {import("./parts.js").Looked} */ (found);
+    this.stage.seen = new Set(found.cells);
+    if (episode) for (const part of [this.stage, views]) part.show(episode, length);
   }
 }
 

@@ -13,6 +13,7 @@ import { slotsOf } from "./trace.js";
 export class Stage {
   constructor() {
     this.letters = false;
+    /** @type {Set<number> | undefined} cells that are marked in place of the agent's field of view */ this.seen = undefined;
     this.canvas = make("canvas", { role: "img" });
     this.bubbles = make("div", { class: "bubbles" });
     this.told = make("p", { class: "visually-hidden", "aria-live": "polite" });
@@ -24,7 +25,7 @@ export class Stage {
   show(episode, step) {
     const scene = episode.scenes[step];
     const tile = fittingTile(scene.room, this.root.clientWidth, Math.max(240, this.root.clientHeight), 96);
-    drawPicture(this.canvas, scene.room, { tile, letters: this.letters });
+    drawPicture(this.canvas, { ...scene.room, seen: this.seen }, { tile, letters: this.letters });
     const scale = globalThis.devicePixelRatio || 1;
     this.canvas.style.width = `${this.canvas.width / scale}px`;
     this.canvas.style.height = `${this.canvas.height / scale}px`;

@@ -13,12 +13,12 @@ import { inView } from "./trace.js";
  *   first letters of colours
  */
 export function drawPicture(canvas, picture, { tile, letters = false }) {
-  const { width, height, cells, agent, below, gestures, held, marks, tinted } = picture;
+  const { width, height, cells, agent, below, gestures, held, marks, tinted, seen: marked } = picture;
   canvas.width = width * tile;
   canvas.height = height * tile;
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const seen = (/** @type {number} */ x, /** @type {number} */ y) =>
-    tinted && x >= 0 && y >= 0 && x < width && y < height && inView(agent, x, y);
+    tinted && x >= 0 && y >= 0 && x < width && y < height && (marked ? marked.has(y * width + x) : inView(agent, x, y));
   cells.forEach((look, cell) => {
     const x = cell % width, y = Math.floor(cell / width);
     drawTile(context, x * tile, y * tile, tile, look, {

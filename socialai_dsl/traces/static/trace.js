@@ -67,6 +67,7 @@
  * @property {Map<number, Look>} held what who stands in a cell carries
  * @property {Map<number, Mark[]>} marks the looks of what is seen in a cell
  * @property {boolean} tinted whether the agent's field of view is marked
+ * @property {Set<number>} [seen] the cells that are marked in its place
  */
 /**
  * A moment with everything that is so in it.

@@ -20,6 +20,7 @@ GAME: list[dict[str, Any]] = [
     {"do": "auto"},
     {"do": "back", "to": 0},
     {"do": "place", "who": "wizard", "at": [1, 1]},
+    {"do": "look", "who": "wizard"},
     {"do": "layout"},
     {"do": "write_layout", "text": "scenario: x\n"},
     {"do": "replay"},

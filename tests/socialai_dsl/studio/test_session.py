@@ -326,3 +326,23 @@ def test_it_says_who_can_play(shy: tuple[Session, str], session: Session, path: 
     shy[0].auto()
     with pytest.raises(RefusalError, match="has no script"):
         shy[0].begin(Room(), "script")
+
+
+def test_what_a_member_of_the_cast_sees_follows_the_episode(shy: tuple[Session, str]) -> None:
+    session, _ = shy
+    session.begin(Room(seed=2))
+    first = session.look("guide")
+    assert (first["who"], first["step"], first["side"]) == ("guide", 0, 7)
+    up = {7 * y + x for y in range(4) for x in range(2, 7)}
+    assert set(first["cells"]) == up, "at 5, 3, looking up"
+    session.act("forward")
+    left = {7 * y + x for y in range(7) for x in range(6)}
+    assert session.layout()["layout"]["guide"]["facing"] == "left"
+    assert set(session.look("guide")["cells"]) == left
+    session.back(0)
+    assert session.look("guide") == first
+    session.begin(Room(test_episode=3))
+    assert session.look("guide")["cells"] == first["cells"]
+    for nobody in ("agent", "door", "nobody", ""):
+        with pytest.raises(RefusalError, match="nobody called"):
+            session.look(nobody)
