@@ -3,7 +3,7 @@
 import { make } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
-import { claimItems, findingItems, page, roomInWords, testItems, verdictOf } from "./found.js";
+import { claimItems, findingItems, marked, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
 import { Counts, Seat, Views } from "./parts.js";
 import { Episode, slotsOf } from "./trace.js";
@@ -600,7 +600,7 @@ class Studio {
     open.sort((a, b) => Number(b.verdict === "fails") - Number(a.verdict === "fails"));
     this.claims.replaceChildren(
       make("ul", { "aria-label": "claims" }, ...claimItems([...open, ...claims.filter((one) => one.verdict === "holds")], this.ways), ...findingItems(done.findings, this.ways)),
-      ...done.lines.map((/** @type {string} */ line) => make("p", { class: "quiet" }, line)));
+      ...done.lines.map((/** @type {string} */ line) => make("p", { class: "quiet" }, ...marked(line))));
     this.judge("Claims", claims, open);
   }
 
