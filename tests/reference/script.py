@@ -431,7 +431,17 @@ def of_data(
             known[name][npc] = member_of(
                 {key: entry[key] for key in entry if key not in ("npc", "abstract", "about", "notes")}
             )
-    for key in ("about", "skills", "notes", "instructions", "training_frames", "abstract", "check", "rivals"):
+    unplayed = (
+        "about",
+        "skills",
+        "notes",
+        "published",
+        "instructions",
+        "training_frames",
+        "abstract",
+        "check",
+    )
+    for key in (*unplayed, "rivals"):
         data.pop(key, None)
     data |= {"frames": frames, "params": params, "files": known}
     script: Script = record(Script, data, READERS)
