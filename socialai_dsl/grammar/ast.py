@@ -617,6 +617,8 @@ _UNIT = re.compile(rf"(?<![\w.])(\d+) *(?:{_UNITS})\b(?!\s*[.(])")
 _WEIGHT = re.compile(r"(?<![\w.])(\d*)\.(\d+)(?=\s*\*)")
 """A weight with decimals."""
 
+_WHOLE = "numbers in expressions are whole; what is drawn is `pick(a | b)`, with weights `pick(3 * a | b)`"
+
 _LOOKING = re.compile(r"(\w+)\(\s*(\w+)\s+$")
 """What stands before the second word of `any(d in doors ...)`."""
 
@@ -634,7 +636,7 @@ def _of_numbers(text: str, offset: int) -> ParseProblem | None:
         return None
     message, weights = f"`{decimal[0]}` is not a whole number", list(_WEIGHT.finditer(text))
     if not any(weight.start() == decimal.start() for weight in weights):
-        return ParseProblem("S210", message, decimal.start(), "numbers in expressions are whole")
+        return ParseProblem("S210", message, decimal.start(), _WHOLE)
     if len(weights) <= text.count("|"):
         return ParseProblem("S210", message, decimal.start(), "weights are whole, such as `2 * left | right`")
     # The same proportions in whole numbers.
@@ -726,6 +728,9 @@ def _wrong_symbol(text: str, offset: int) -> ParseProblem:
         letter = "o" if numbered["group"] == "d" else "d"
         found = f"first({letter} in {numbered['group']} where {letter}.index == {numbered['index']})"
         return ParseProblem("S203", "`[` is not used here", offset, instead=Instead(*numbered.span(), found))
+    if text[offset] == ":" and re.search(r"\(\s*\w+ in [\w.]+$", text[:offset]) is not None:
+        instead = Instead(offset, offset + 1, " where")
+        return ParseProblem("S203", "`:` is not used here", offset, instead=instead)
     for symbol, meant in _SYMBOLS.items():
         if text.startswith(symbol, offset):
             instead = Instead(offset, offset + len(symbol), meant)

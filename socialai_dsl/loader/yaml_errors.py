@@ -11,6 +11,9 @@ from socialai_dsl.diagnostics import Diagnostic
 from socialai_dsl.source import Source, TextEdit
 
 _TEXT_QUOTES: Final = {"'": "'", '"': '"'}
+_GROUP_BEFORE: Final = re.compile(r"\(\s*\w+ in [\w.]+$")
+"""What stands before the colon of `any(d in doors: ...)`."""
+
 _COLON_IN_TEXT: Final = "not YAML: a colon followed by a space starts a new key; quote the text"
 
 
@@ -20,7 +23,7 @@ def explain(error: Exception, source: Source) -> Diagnostic:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     place = _Place.of(source, mark)
     context = _Place.of(source, getattr(error, "context_mark", None) or mark)
-    for explanation in (_swallowed, _unclosed, _colon, _first_character, _after_quote, _layout):
+    for explanation in (_ternary, _swallowed, _unclosed, _colon, _first_character, _after_quote, _layout):
         found = explanation(problem, place, context)
         if found:
             return found
@@ -77,6 +80,17 @@ class _Place:
 
     def finding(self, message: str, hint: cures.Hint = None) -> Diagnostic:
         return Diagnostic("S001", message, self.source.span(self.line_number, self.column), hint=hint)
+
+
+def _ternary(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    """A choice as other languages write it, whose colon YAML takes for that of a key."""
+    found = re.search(r"\S \? [^?:]* : ", place.line)
+    if found is None or not found.start() < place.column:
+        return None
+    mark = _Place(place.source, place.line_number, place.line.index("?", found.start()) + 1)
+    return mark.finding(
+        "not YAML: `? :` is not used here", "a value that depends is written `a if condition else b`"
+    )
 
 
 def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
@@ -145,6 +159,10 @@ def _colon(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
         )
     if not place.before.strip(" -{,"):
         return place.finding("not YAML: there is no key before this colon")
+    if _GROUP_BEFORE.search(place.before) is not None:
+        where = place.source.span(place.line_number, place.column)
+        message = "not YAML: a colon followed by a space starts a new key"
+        return place.finding(message, cures.write("where", TextEdit(where, " where")))
     return place.finding(_COLON_IN_TEXT, _in_quotes(place))
 
 

@@ -602,7 +602,8 @@ class _Report:
         hint = self._cure(finding, expected)
         if isinstance(finding.value, float) and expected == "an expression":
             expected = "a whole number or an expression"
-        what = f"`{key}` is {expected}" if key else f"{expected} is expected"
+        named = f"an entry of `{key}`" if finding.path and isinstance(finding.path[-1], int) else f"`{key}`"
+        what = f"{named} is {expected}" if key else f"{expected} is expected"
         self._bag.error("S104", f"{what}, here is {got}", span, hint=hint)
 
     def _as_share(self, finding: _Finding) -> cures.Hint:
@@ -640,6 +641,11 @@ class _Report:
             if found[2] == "%" and expected == "a number":
                 return self._instead(path, f"{float(number) / 100:g}", "it is a share, not per cent")
             return self._instead(path, number, "a number has no unit")
+        called = _CALL.fullmatch(value) if isinstance(value, str) and "mapping" in expected else None
+        if called is not None and called[1] in _KEYS:
+            return self._instead(path, f"{{{called[1]}: {called[2]}}}")
+        if isinstance(value, dict) and expected == "an expression":
+            return "an expression has no colon; of each of a group it is asked by `all(d in doors where ...)`"
         if isinstance(value, list | dict) and expected in ("a text", "an expression"):
             return self._quoted(path, "brackets" if isinstance(value, list) else "braces or a colon")
         return None
@@ -714,6 +720,7 @@ _RANGES: Final = ("size", "width", "height", "range")
 _UNIT: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]+|%)\s*")
 """A number with what it counts."""
 
+_CALL: Final = re.compile(r"\s*(\w+)\(\s*([\w.]+)\s*\)\s*")
 _ASSIGNMENT: Final = re.compile(r"\s*(\w+)\s*=\s*([^=].*)")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, Final, cast
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
@@ -63,6 +63,9 @@ from socialai_dsl.semantics.words.effects import Caused
 from socialai_dsl.source import DataPath
 from socialai_dsl.widths import LARGEST_NUMBER
 
+_ABOUT_SOMETHING: Final = {"toggle": "use", "pickup": "fetch"}
+"""The activities that do with something what a body action does with what is ahead."""
+
 
 def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) -> Activity:
     """The body action of a state, step or rule; without one it stays."""
@@ -76,7 +79,10 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
     if word is None:
         raise _unknown(resolver, name, args, node, scope)
     if len(args) != len(word.takes):
-        raise resolver.fail("S211", wrong_count(word, len(args)), node, scope)
+        hint = None
+        if (meant := _ABOUT_SOMETHING.get(name)) is not None and len(args) == 1:
+            hint = resolver.instead(f"{meant}({quoted(args[0])})", node, scope, "which goes there, too")
+        raise resolver.fail("S211", wrong_count(word, len(args)), node, scope, hint=hint)
     own = scope.member == AGENT and not (scope.frame is not None and scope.frame.looked_at)
     if word.arm is not None and own:
         raise resolver.fail("S204", "the agent cannot point; only NPCs do", node, scope)
@@ -465,7 +471,8 @@ class _Planner:
         endless = doing is not None and any(
             name in ACTIVITIES and ACTIVITIES[name].endless for name in (doing.name, head)
         )
-        if step.do is not None and step.until is None and step.for_ is None and endless:
+        unbounded = step.until is None and step.for_ is None and step.while_ is None  # the last is reported
+        if step.do is not None and unbounded and endless:
             findings = self.resolver.findings
             message = f"`{step.do}` never ends by itself"
             hint: cures.Hint = "add `until:` or `for:`"

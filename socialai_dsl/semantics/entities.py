@@ -56,7 +56,7 @@ from socialai_dsl.semantics.terms import (
     Type,
 )
 from socialai_dsl.semantics.terms import number as number_of
-from socialai_dsl.semantics.words import RESERVED
+from socialai_dsl.semantics.words import RESERVED, VALUES
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import is_plain
 
@@ -688,10 +688,14 @@ def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]
         return 1, 1
     if raw == "room":
         return 0, symbols.width[1] + symbols.height[1]
+    findings = resolver.findings
+    message = "`earshot` is next_to, room, or a known number of cells"
+    if isinstance(raw, str) and raw.isidentifier() and raw in VALUES:  # `all`, say
+        findings.error("S204", message, findings.places.value_span(path))
+        return 1, 1
     with surviving():
         term: Term = resolver.written(raw, INT, reset_scope(path))
         if isinstance(term, Const) and term.value >= 0:
             return 0, term.value
-        findings = resolver.findings
-        findings.error("S204", "`earshot` is next_to, room, or a known number of cells", findings.at(path))
+        findings.error("S204", message, findings.at(path))
     return 1, 1

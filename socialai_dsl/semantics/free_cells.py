@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property
 from itertools import product
@@ -197,6 +198,11 @@ def _report(
         taken = f"; {before} take all there are" if before else ""
         message = f"`{name}` has no free cell in {where}{taken}"
         hint = "widen its place, or the room"
+        rects = [region for region in placing.regions if region.name == "rect" and not region.side]
+        if not before and rects and len(rects) == len(placing.regions):
+            with suppress(UnknownError):
+                if not any(interior_cells(region, size) for region in rects):
+                    hint = f"{_sizes_of(checked)}"
         if not before and checked.room.build and any(region.name in EXACT for region in placing.regions):
             hint = "with `overlap: true` it can stand where the room builds something"
         report = findings.warning if before else findings.error

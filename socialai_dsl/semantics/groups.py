@@ -7,6 +7,7 @@ from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
 from typing import Final, cast
 
+from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Frame, Sequence
@@ -117,7 +118,17 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
     if isinstance(single, Const):
         return Group(single.type, (single,))
     message = f"`{quoted(node)}` is {described(single.type)}, here a group is needed"
-    raise resolver.fail("S204", message, node, scope, hint=_GROUPS)
+    raise resolver.fail("S204", message, node, scope, hint=_one_by_one(resolver, node, scope) or _GROUPS)
+
+
+def _one_by_one(resolver: Resolver, node: ast.Expr, scope: Scope) -> cures.Hint:
+    """The proposal to ask of each what is asked of a group as a whole: `c in coins where seen(c)` for `seen(coins)`."""
+    parts = [part for part in node.walk() if isinstance(part, ast.Name) and is_group(resolver, part, scope)]
+    if len(parts) != 1:
+        return None
+    group, letter = parts[0], parts[0].id[0]
+    asked = ast.rebuilt(node, lambda part: ast.Name(letter) if part is group else part)
+    return resolver.instead(f"{letter} in {group.id} where {ast.unparse(asked)}", node, scope)
 
 
 def must_be_known(resolver: Resolver, node: ast.Expr, scope: Scope) -> None:
@@ -276,6 +287,13 @@ def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> 
                 condition, node, scope, "a comparison with `in` takes brackets of its own"
             )
             raise resolver.fail("S205", message, node, scope, hint=hint)
+        words = resolver.words
+        meant = next((word for word in words.quantifiers if node.name in words.values[word].also), None)
+        if meant is not None:
+            place = cures.over_part(
+                resolver.findings.places, scope.path, node.at, node.at + len(node.name), meant
+            )
+            raise resolver.fail("S205", message, node, scope, hint=cures.write(meant, place))
         raise resolver.fail(
             "S205", message, node, scope, suggestion=did_you_mean(node.name, resolver.words.quantifiers)
         )

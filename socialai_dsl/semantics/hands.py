@@ -8,7 +8,7 @@ from socialai_dsl import cures
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import Scope, quoted, with_article
+from socialai_dsl.semantics.scope import FailedError, Scope, quoted, with_article
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
@@ -23,6 +23,7 @@ from socialai_dsl.semantics.terms import (
     entity,
     number,
 )
+from socialai_dsl.source import Span
 
 CARRYABLE = "what can be carried says so: `carryable: true`"
 
@@ -85,12 +86,22 @@ def carried(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term
     return groups.made("first", members, name, condition, scope)
 
 
+def nothing_carried(resolver: Resolver, message: str, span: Span) -> FailedError:
+    """Report that nothing can be carried, once: all that is asked of hands then fails for the same reason."""
+    if "carryable" in resolver.reported:
+        return FailedError()
+    resolver.reported.add("carryable")
+    return resolver.findings.fail("S204", message, span, hint=CARRYABLE)
+
+
 def _check_hands(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> None:
     """Report what has no hands, and a scenario in which nothing is carried."""
     if not is_member(resolver, who):
         raise resolver.fail("S204", "only members of the cast carry something", node, scope)
     if not carryable(resolver):
-        raise resolver.fail("S204", "nothing here can be carried", node, scope, hint=CARRYABLE)
+        raise nothing_carried(
+            resolver, "nothing here can be carried", resolver.findings.node(scope.path, node)
+        )
 
 
 def _in_hands(resolver: Resolver, who: Term, thing: Term) -> Term:

@@ -454,7 +454,7 @@ def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:
             asked = resolver.sited(member.accepts, BOOL, scope)
             if not hands.carryable(resolver):
                 message = "nothing here can be given"
-                raise resolver.findings.fail("S204", message, asked.span, hint=hands.CARRYABLE)
+                raise hands.nothing_carried(resolver, message, asked.span)
             message = "`accepts` is asked in every step, so nothing can be drawn in it"
             noted = resolver.registers.remember(resolver.undrawn(asked, message))
             yield resolver.symbols.numbers[name], noted.path

@@ -12,11 +12,11 @@ from typing import Final
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.grammar.ast import every
+from socialai_dsl.grammar.ast import Not, every, unparse
 from socialai_dsl.schema.scenario import Frame, Scenario, State, Step
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
-from socialai_dsl.semantics.scope import Findings, frames_of
+from socialai_dsl.semantics.scope import Findings, frames_of, surviving
 from socialai_dsl.semantics.terms import (
     Const,
     Logic,
@@ -248,6 +248,21 @@ _OF_AN_ENTRY = ("do", "for", "state", "set", "cause", "say")
 _OF_NESTED_STEPS = ("repeat", "while")
 
 
+def _until(findings: Findings, path: DataPath) -> cures.Hint:
+    """The proposal to say until when, where an entry says as long as what."""
+    part = findings.places.at(path)
+    if not isinstance(part.value, str) or part.span.key is None:
+        return None
+    with surviving():
+        node = findings.expression(path, part.value)
+        node = node.operand if isinstance(node, Not) else Not(node)
+        text = unparse(node)
+        written = cures.in_quotes(text) if cures.needs_quotes(text, part.span.flow) else text
+        edit = part.source.edit(part.source.index(part.span.key), part.end, f"until: {written}")
+        return cures.write(f"until: {text}", edit)
+    return None
+
+
 def _check_order(steps: Sequence[Step], path: DataPath, findings: Findings) -> None:
     """Keys that belong to an entry, or to nested steps; entries after one that lasts for ever."""
     for i, step in enumerate(steps):
@@ -257,10 +272,11 @@ def _check_order(steps: Sequence[Step], path: DataPath, findings: Findings) -> N
         keys = written if isinstance(written, dict) else {}
         for key in keys.keys() & {*(_OF_AN_ENTRY if nested else _OF_NESTED_STEPS)}:
             span = findings.places.key_span((*place, key))
-            message = f"`{key}` belongs to an entry, not to nested `steps`"
+            message, hint = f"`{key}` belongs to an entry, not to nested `steps`", None
             if not nested:
                 message = f"`{key}` belongs to nested `steps`: `{{repeat: 3, steps: [...]}}`"
-            findings.error("S107", message, span)
+                hint = _until(findings, (*place, key)) if key == "while" else None
+            findings.error("S107", message, span, hint=hint)
         if step.steps is not None:
             bounds = [key for key in ("while", "until") if key in keys]
             if step.repeat is None and bounds:

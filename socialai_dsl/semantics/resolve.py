@@ -65,7 +65,11 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         raise _unknown(resolver, node, scope)
     most = len(word.takes)
     if not most - word.optional <= len(node.args) <= most:
-        raise resolver.fail("S211", wrong_count(word, len(node.args)), node, scope)
+        hint = None
+        if word.takes == ("group",) and len(node.args) > 1:
+            several = " | ".join(map(quoted, node.args))
+            hint = resolver.instead(f"{node.name}({several})", node, scope, "alternatives are written a | b")
+        raise resolver.fail("S211", wrong_count(word, len(node.args)), node, scope, hint=hint)
     if word.subject == "none" and node.subject is not None:
         message = f"`{node.name}` has nothing before it: write `{node.name}(...)`"
         raise resolver.fail("S211", message, node, scope)

@@ -479,7 +479,7 @@ def suggestion(
         return near, None
     kind = declared[near]
     section = {"object": "objects"}.get(kind, kind)
-    span = resolver.findings.places.key_span((section, near))
+    span = resolver.findings.places.key_span((*section.split("."), near))
     is_here = span.file == resolver.findings.at(scope.path).file
     return near, f"{kind}, line {span.line}" if is_here else f"{kind}, {span.file}:{span.line}"
 

@@ -580,6 +580,7 @@ class Resolver(ABC):
         self.readings = Readings()
         self.used: set[DataPath] = set()
         self.missing_keys: set[tuple[str, str]] = set()
+        self.reported: set[str] = set()
         self.slot_words: dict[Term, tuple[FilledSlot, Term]] = {}
         said_to = (entry.to for frame in frames.values() for entry in frame.model.all_effects())
         self.addresses = symbols.scenario.grammar.to is not None or any(to is not None for to in said_to)
@@ -690,8 +691,16 @@ class Resolver(ABC):
         hint: cures.Hint = None
         if expected.kind == "bool" and term.type.kind == "text":
             hint = "write `true` or `false`"
+        elif expected == DIRECTION and term.type.kind in ("entity", "cell"):
+            towards = "toward" if scope.path[-1:] == ("facing",) else "dir_to"
+            hint = self.instead(f"{towards}({quoted(node)})", node, scope)
         elif expected.words and expected.kind not in ("noun", "bool"):
             hint = f"one of {words_of(expected)}"
+        elif expected.kind == "entity" and term.type == COLOR:
+            around = self.around(node)
+            if isinstance(around, ast.Compare):
+                thing = around.right if around.left is node else around.left
+                hint = self.instead(f"{quoted(thing)}.color", thing, scope)
         elif expected.kind == "int" and term.type.kind == "noun":
             other = next(word for word in term.type.words if not is_number(word))
             hint = f"it is a number only if every noun is one; `{other}` is none"

@@ -77,15 +77,18 @@ FUNCTIONS: Final = (
 )  # fmt: skip
 
 QUANTIFIERS: Final = (
-    Value("any", "none", ("group",), "condition", "any(d in group where ...): one of them does", meaning=_needs_more),
-    Value("all", "none", ("group",), "condition", "all(d in group where ...): each of them does", meaning=_needs_more),
-    Value("count", "none", ("group",), "number", "count(d in group where ...): how many do", meaning=_whole_group),
+    Value("any", "none", ("group",), "condition", "any(d in group where ...): one of them does",
+          also=("exists", "some"), meaning=_needs_more),
+    Value("all", "none", ("group",), "condition", "all(d in group where ...): each of them does",
+          also=("forall", "for_all", "every"), meaning=_needs_more),
+    Value("count", "none", ("group",), "number", "count(d in group where ...): how many do",
+          also=("len", "number_of", "how_many"), meaning=_whole_group),
     Value("first", "none", ("group",), "one of them", "first(d in group where ...): the first that does",
           meaning=_whole_group),
     Value("pick", "none", ("group",), "one of them", "pick(group), pick(d in group where ...): drawn at random",
-          meaning=_whole_group),
+          also=("choice", "sample", "draw"), meaning=_whole_group),
     Value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y",
-          meaning=_needs_more),
+          also=("closest",), meaning=_needs_more),
     Value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do",
           meaning=_needs_more),
 )  # fmt: skip

@@ -159,7 +159,9 @@ def _in_state(use: Use, member: str | None, called: str | None) -> Term:
     states += [FINISHED] if frame.model.steps else []
     (argument,) = use.args
     if not isinstance(argument, ast.Name | ast.Truth):
-        raise use.fail("S211", "`is` takes the name of a state", argument)
+        state = argument.plain if isinstance(argument, ast.Text) else None
+        hint = use.resolver.instead(state, argument, use.scope) if state in states else None
+        raise use.fail("S211", "`is` takes the name of a state", argument, hint=hint)
     state = argument.id if isinstance(argument, ast.Name) else str(argument.value).lower()
     if state not in states:
         called = (use.resolver.symbols.group_of(member) or (member, 0))[0]

@@ -10,7 +10,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Region, RegionName
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import Scope
+from socialai_dsl.semantics.scope import Scope, quoted
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import SIDE, Const, Type
 from socialai_dsl.vocabulary import SIDES
@@ -46,6 +46,25 @@ def _known(placed: Placed) -> tuple[Region, ...]:
     """A region of numbers."""
     args = tuple(placed.resolver.value(arg, INT, placed.scope) for arg in placed.args)
     return (Region(cast(RegionName, placed.signature.name), args),)
+
+
+def _rect(placed: Placed) -> tuple[Region, ...]:
+    """A region between two corners, the left upper one first."""
+    (found,) = _known(placed)
+    known = [arg.value if isinstance(arg, Const) else None for arg in found.args]
+    pairs = [
+        sorted(pair, key=lambda n: n or 0) if None not in pair else [*pair]
+        for pair in (known[::2], known[1::2])
+    ]
+    ordered = [pairs[0][0], pairs[1][0], pairs[0][1], pairs[1][1]]
+    if ordered != known:
+        written = [quoted(arg) if n is None else str(n) for arg, n in zip(placed.args, ordered, strict=True)]
+        message = (
+            f"`{quoted(placed.node)}` is empty: it goes from its left upper corner to its right lower one"
+        )
+        hint = placed.resolver.instead(f"rect({', '.join(written)})", placed.node, placed.scope)
+        raise placed.resolver.fail("S106", message, placed.node, placed.scope, hint=hint)
+    return (found,)
 
 
 def _about(placed: Placed) -> tuple[Region, ...]:
@@ -89,7 +108,7 @@ PLACES: Final = (
     _half("bottom_half", "y > H // 2"),
     Place("column", "none", ("int",), "place", "the column x, without the walls", meaning=_known),
     Place("row", "none", ("int",), "place", "the row y, without the walls", meaning=_known),
-    Place("rect", "none", ("int", "int", "int", "int"), "place", "from (x0, y0) to (x1, y1)", meaning=_known),
+    Place("rect", "none", ("int", "int", "int", "int"), "place", "from (x0, y0) to (x1, y1)", meaning=_rect),
     Place("next_to", "none", ("entities",), "place", "one cell away from x", meaning=_about),
     Place("in_front_of", "none", ("entities",), "place", "the cell before x", meaning=_about),
     Place("wall", "none", ("side",), "place", "in this wall, not in its corners", meaning=_wall),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Unpack
 
+from socialai_dsl.diagnostics import Advice
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import Resolver
@@ -54,7 +56,9 @@ class Use:
             return groups.any_member(self.resolver, node, self.scope, relation)
         return relation(self.resolver.somewhere(node, self.scope))
 
-    def fail(self, code: str, message: str, node: ast.Expr | None = None, **more: str | None) -> FailedError:
+    def fail(
+        self, code: str, message: str, node: ast.Expr | None = None, **more: Unpack[Advice]
+    ) -> FailedError:
         """Report what is wrong with it, or with a part of it; raising the result gives it up."""
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 
