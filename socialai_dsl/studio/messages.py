@@ -333,6 +333,10 @@ class _Placed(_Part):
     column: int
 
 
+class RefusalError(ValueError):
+    """Something cannot be done; the message is for the person at the screen, see `Refused`."""
+
+
 class Finding(_Placed):
     """A finding.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from socialai_dsl.authoring.saving import NameTakenError
 from socialai_dsl.checking.briefing import NO_BRIEFING, brief
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
-from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity, printable
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.gaze import Gaze
@@ -28,31 +28,21 @@ from socialai_dsl.frontend import Loaded, check, closest_script, load
 from socialai_dsl.library import prelude
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.loader.resolved import taken_apart
-from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.semantics.typed import Phrases
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import Source
+from socialai_dsl.studio.judging import finding, texts_of
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
-from socialai_dsl.studio.messages import Room, Shown
+from socialai_dsl.studio.messages import RefusalError, Room, Shown
 from socialai_dsl.traces import Thought, Tracer
 from socialai_dsl.traces.endings import endings_of
 from socialai_dsl.traces.page import replay_page
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
-if TYPE_CHECKING:
-    from socialai_dsl.analysis.reports import Report
-    from socialai_dsl.evaluation.testing import PlayedTest
-
 Reply = dict[str, Any]
 
 _FIRST: Final = Room()
-_CHECK_SECONDS: Final = 20.0
 _ENDED: Final = "the episode has ended; take steps back, or begin another"
 _FLOOR: Final = prelude().types["floor"].code
-
-
-class RefusalError(ValueError):
-    """Something cannot be done; the message is for the person at the screen."""
 
 
 class Session:
@@ -73,10 +63,10 @@ class Session:
 
     def draw(self, path: str, text: str, room: Room = _FIRST) -> Reply:
         """Check a text that is to stand in a file, and draw its room if it is sound; of tests their scenario's."""
-        self._file, self._texts = Path(path), _texts(path, text)
+        self._file, self._texts = Path(path), texts_of(path, text)
         found = check(path, self._texts)
         own = display_name(self._file)
-        told = [_finding(one, own) for one in found.diagnostics]
+        told = [finding(one, own) for one in found.diagnostics]
         if found.has_errors:
             return {"findings": told}
         whole = found.whole
@@ -85,7 +75,7 @@ class Session:
             loaded = load(str(self._scenario), self._texts)
             self._use(loaded)
         except ScenarioError as error:  # it is sound, and nothing that can be played
-            return {"findings": [*told, *(_finding(one, own) for one in error.diagnostics)]}
+            return {"findings": [*told, *(finding(one, own) for one in error.diagnostics)]}
         self._player, self._variant = "me", ""
         try:
             return {"findings": told, "plays": self._plays(loaded), **self.begin(room)}
@@ -260,7 +250,7 @@ class Session:
         stage, _ = self._playing()
         described = stage.env.describe()
         layout, stem = start_layout(described), self._scenario.stem
-        loaded = load(str(self._scenario), _texts(self._file, text))
+        loaded = load(str(self._scenario), texts_of(self._file, text))
         if not isinstance(loaded, LoadedSuite):
             name = f"{re.sub(r'[^a-zA-Z0-9_]', '_', stem)}_known"
             return {"suite": suite_text(name, self._scenario.name, layout), "name": f"{name}.yaml"}
@@ -276,41 +266,6 @@ class Session:
         """The episode so far as a page of its own."""
         _, tracing = self._playing()
         return {"page": replay_page([tracing.tracer.trace().portable()])}
-
-    def check(self, path: str, text: str) -> Reply:
-        """What `socialai check` finds of a text."""
-        from socialai_dsl.analysis.check import check_scenario, compile_engine
-        from socialai_dsl.analysis.effort import Clock, Effort
-
-        own, texts = display_name(Path(path)), _texts(path, text)
-        try:
-            loaded = load(path, texts)
-        except ScenarioError as error:
-            return {"claims": [], "findings": [_finding(one, own) for one in error.diagnostics], "lines": []}
-        if not isinstance(loaded, LoadedScenario):
-            raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
-        compile_engine()  # before the time begins
-        effort = Effort(100, 0, clock=Clock(_CHECK_SECONDS, lambda said: None))
-        report = check_scenario(loaded, path, effort, texts=texts)
-        report.scenario = own
-        return {
-            "claims": [_claim(plan, found, report.seed, own) for plan, found in report.tried],
-            "findings": [_finding(one, own) for one in report.parts()],
-            "lines": list(report.summary()),
-        }
-
-    def test(self, path: str, text: str) -> Reply:
-        """What `socialai test` finds of a text."""
-        from socialai_dsl.evaluation.testing import play_tests
-
-        own = display_name(Path(path))
-        try:
-            played = play_tests([path], texts=_texts(path, text))
-        except ScenarioError as error:
-            return {"tests": [], "findings": [_finding(one, own) for one in error.diagnostics]}
-        except UsageError:
-            raise RefusalError("there are no tests yet; play, and make one of what was played") from None
-        return {"tests": [_test(one, own) for one in played], "findings": []}
 
     def write_test(self, name: str, former: str | None = None) -> Reply:
         """What was played as a test, and the file beside the scenario with it."""
@@ -424,8 +379,6 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "layout": Session.layout,
     "write_layout": Session.write_layout,
     "replay": Session.replay,
-    "check": Session.check,
-    "test": Session.test,
     "write_test": Session.write_test,
 }
 """What a window may ask a session for, by name."""
@@ -444,11 +397,6 @@ def _policy(run: str, env: Any) -> Policy:
         raise RefusalError(f"{run}: {error}") from None
 
 
-def _texts(path: str | Path, text: str) -> dict[Path, Source]:
-    """The text of a file in place of what it holds."""
-    return {Path(path): Source(display_name(Path(path)), text)}
-
-
 def _title(room: Room) -> str:
     """Which room it is, in words."""
     if room.layout is not None:
@@ -456,45 +404,3 @@ def _title(room: Room) -> str:
     if room.test_episode is not None:
         return f"test episode {room.test_episode}"
     return f"seed {room.seed}" + ("" if room.index is None else f", room {room.index}")
-
-
-def _place(span: Span, own: str) -> Reply:
-    return {"file": None if span.file == own else span.file, "line": span.line, "column": span.column}
-
-
-def _claim(plan: PropertyPlan, found: Report, seed: int, own: str) -> Reply:
-    """A claim, with the first room that speaks against it; what is done there, or who plays there."""
-    shown = None
-    if found.against and found.verdict.value != "holds":
-        variant = f"+{plan.rival}" if plan.rival else ""
-        acts = list(found.acts) or None
-        shown = {"room": {"seed": seed, "index": found.against[0]}, "variant": variant, "acts": acts}
-    verdict = {"claim": plan.text, "verdict": found.verdict.value, "said": found.said, "shown": shown}
-    return {**_place(plan.span, own), **verdict}
-
-
-def _test(played: PlayedTest, own: str) -> Reply:
-    """A test, with the room and the acts after which something is wrong."""
-    result, performed = played.as_object(), played.performed
-    shown = None
-    if played.fails and performed.reset:
-        room = {"seed": performed.reset.get("seed", 0), **(performed.reset["options"] or {})}
-        variant = taken_apart(played.called)[1]
-        shown = {"room": room, "variant": variant, "acts": list(performed.done)}
-    return {
-        **_place(played.plan.span, own),
-        **{key: result[key] for key in ("test", "scenario", "rooms", "passes")},
-        "findings": [_finding(one, own) for one in played.outcome.diagnostics],
-        "shown": shown,
-    }
-
-
-def _finding(found: Diagnostic, own: str) -> Reply:
-    return {
-        **_place(found.span, own),
-        "message": found.text,
-        "help": found.help,
-        "notes": [printable(note) for note in found.notes],
-        "code": found.code,
-        "error": found.severity is Severity.ERROR,
-    }

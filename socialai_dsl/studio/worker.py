@@ -19,8 +19,9 @@ from typing import Any, Final
 from socialai_dsl.authoring.server import make_server
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.studio.files import FileError, Folder
-from socialai_dsl.studio.messages import QUESTIONS, Question, Refused, parsed
-from socialai_dsl.studio.session import ASKED, RefusalError, Session
+from socialai_dsl.studio.judging import JUDGED
+from socialai_dsl.studio.messages import QUESTIONS, Question, RefusalError, Refused, parsed
+from socialai_dsl.studio.session import ASKED, Session
 
 MOST_BYTES: Final = 4 << 30
 """What a process may hold; a trained agent needs a tenth of it."""
@@ -101,6 +102,8 @@ class Desk:
             more["path"] = str(self._folder.path(more["path"]))
         if "player" in more:
             more["player"] = self._folder.player(more["player"])
+        if question.do in JUDGED:
+            return JUDGED[question.do](**more)
         return ASKED[question.do](self._session, **more)
 
 

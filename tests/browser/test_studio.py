@@ -468,7 +468,7 @@ def test_a_violated_claim_stands_beside_its_line_and_opens_its_room(shy: Page) -
     rival = shy.get_by_role("listitem").filter(has_text="rival: hasty")
     rival.get_by_role("button", name="Show room").click()
     shy.locator(".message.good", has_text="success").wait_for()
-    assert shy.get_by_label("who plays").input_value() == "script"
+    assert shy.get_by_label("who plays").input_value() == "+hasty"
     # What is found is about the text as it was.
     shy.locator(".cm-content").get_by_text("horizon", exact=True).click()
     shy.keyboard.press("End")

@@ -660,11 +660,13 @@ class Studio {
     const made = await this.line.ask("write_test", { name: "my_test" });
     if (made.refused) return this.tell(made.refused);
     const folder = this.name.replace(/[^/]*$/, ""), beside = made.beside === null ? null : `${folder}${made.beside}`;
+    const isThere = (this.offered?.files ?? []).includes(beside);
+    const where = isThere ? `It is put into the text of ${beside}, where you save it or take it back.` : `${beside} is made, with it alone.`;
     const called = make("input", { value: "my_test", "aria-label": "name of the test", oninput: () => (text.textContent = made.entry.replace("my_test", called.value.trim())) });
     const text = make("pre", { tabindex: 0, "aria-label": "the test" }, made.entry);
     /** @type {[string, () => void][]} */
     const own = beside ? [[`Put it into ${beside}`, () => this.putTest(called.value.trim(), beside)]] : [];
-    this.ask(`A test of what was played. ${beside ? `It is put into the text of ${beside}, where you save it or take it back.` : ""}`,
+    this.ask(`A test of what was played. ${beside ? where : ""}`,
       [...own, ["Close", () => {}]], make("label", {}, "Name ", called), text);
   }
 

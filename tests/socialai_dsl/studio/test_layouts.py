@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 import socialai_dsl as sd
-from socialai_dsl.studio.messages import Room
-from socialai_dsl.studio.session import RefusalError, Session
+from socialai_dsl.studio.messages import RefusalError, Room
+from socialai_dsl.studio.session import Session
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 FORMS = {

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 
 from socialai_dsl.studio import engine, messages
 from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker
+from socialai_dsl.studio.judging import JUDGED
 from socialai_dsl.studio.messages import ANSWERS, QUESTIONS, WINDOW_QUESTIONS, Check, Refused, parsed
 from socialai_dsl.studio.session import ASKED
 from socialai_dsl.studio.worker import Desk, answer_window
@@ -32,7 +33,9 @@ def words(union: Any) -> set[str]:
 
 def test_every_question_has_an_answer_and_is_tried_below() -> None:
     questions, answers = get_args(messages.Question)[0], get_args(messages.Answer)[0]
-    assert set(ASKED) == words(questions) == words(answers) - {"refused"} == {one["do"] for one in GAME}
+    assert (
+        {*ASKED, *JUDGED} == words(questions) == words(answers) - {"refused"} == {one["do"] for one in GAME}
+    )
     assert words(messages.FileQuestion) == {one["do"] for one in FILES}
     for one in (*GAME, *FILES):
         assert parsed(WINDOW_QUESTIONS, json.dumps({"id": 1, **one})).do == one["do"]

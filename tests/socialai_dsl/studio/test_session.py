@@ -14,8 +14,9 @@ from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.llm import Episode
-from socialai_dsl.studio.messages import Room, Shown
-from socialai_dsl.studio.session import RefusalError, Session
+from socialai_dsl.studio.judging import judge_claims, judge_tests
+from socialai_dsl.studio.messages import RefusalError, Room, Shown
+from socialai_dsl.studio.session import Session
 from tests.socialai_dsl.studio.shy import SHY
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -220,8 +221,8 @@ def test_a_violated_claim_leads_to_its_room_and_its_step(
     shy: tuple[Session, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     session, path = shy
-    monkeypatch.setattr("socialai_dsl.studio.session._CHECK_SECONDS", 300.0)  # on a busy machine, too
-    checked = session.check(path, SHY)
+    monkeypatch.setattr("socialai_dsl.studio.judging._CHECK_SECONDS", 300.0)  # on a busy machine, too
+    checked = judge_claims(path, SHY)
     never, reachable, rival, knowable = checked["claims"]
     assert [one["verdict"] for one in checked["claims"]] == ["fails", "holds", "fails", "holds"]
     assert (never["file"], never["line"], SHY.splitlines()[never["line"] - 1][:6]) == (None, 24, "check:")
@@ -245,7 +246,7 @@ def test_a_violated_claim_leads_to_its_room_and_its_step(
 
 def test_a_failing_test_leads_to_the_step_with_which_something_is_wrong(shy: tuple[Session, str]) -> None:
     session, path = shy
-    failing, passing = session.test(path, SHY)["tests"]
+    failing, passing = judge_tests(path, SHY)["tests"]
     assert (passing["test"], passing["passes"], passing["shown"]) == ("gives_up", True, None)
     assert not failing["passes"]
     (finding,) = failing["findings"]
@@ -278,7 +279,7 @@ def test_what_was_played_becomes_a_test_in_the_file_beside(shy: tuple[Session, s
         session.write_test("a test")
     both = session.write_test("told_again", written["text"])["text"]
     Path(path).write_text(SHY)
-    tested = session.test(str(tmp_path / "shy.tests.yaml"), both)["tests"]
+    tested = judge_tests(str(tmp_path / "shy.tests.yaml"), both)["tests"]
     assert [(one["test"], one["passes"]) for one in tested] == [("told", True), ("told_again", True)]
 
 
@@ -296,12 +297,13 @@ def test_beside_its_tests_a_scenario_is_played(shy: tuple[Session, str], tmp_pat
     assert "waits" in session.write_test("moves", text)["text"]
 
 
-def test_mistakes_are_found_before_anything_is_played(shy: tuple[Session, str]) -> None:
-    session, path = shy
-    for found in (session.check(path, "scenarioo: x\n"), session.test(path, "tests: {}\nscenarioo: x\n")):
+def test_mistakes_are_found_before_anything_is_played(tmp_path: Path) -> None:
+    path = str(tmp_path / "shy.yaml")
+    Path(path).write_text(SHY)
+    for found in (judge_claims(path, "scenarioo: x\n"), judge_tests(path, "tests: {}\nscenarioo: x\n")):
         assert found["findings"][0]["code"].startswith("S")
     with pytest.raises(RefusalError, match="there are no tests yet"):
-        session.test(path, SHY[: SHY.index("tests:")])
+        judge_tests(path, SHY[: SHY.index("tests:")])
 
 
 def test_an_episode_begins_again_where_it_began(session: Session) -> None:
