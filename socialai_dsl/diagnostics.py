@@ -79,6 +79,7 @@ CODES: Final[dict[str, str]] = {
     "W404": "a probe with a single answer",
     "S405": "a text that is not one line, or a name that reads like two",
     "W406": "texts that look alike and are not",
+    "W407": "a text that reads like a value",
     # S5xx: variants, parameters and files that belong together
     "S501": "no such path in the scenario",
     "S502": "an added key that exists already",

@@ -301,6 +301,7 @@ def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
 
 def _line(resolver: Resolver, path: DataPath, text: ast.Text, scope: Scope) -> Line:
     span = resolver.findings.places.whole_span(path)
+    _check_is_meant(resolver, path, text, span)
     only = text.parts[0] if len(text.parts) == 1 else None
     slot = _slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
     if slot is not None and len(slot) == 1:
@@ -310,6 +311,25 @@ def _line(resolver: Resolver, path: DataPath, text: ast.Text, scope: Scope) -> L
     if scope.member == "agent":
         return _agents(resolver, line)
     return line
+
+
+_CALLED = re.compile(r"(\w+)\((.*)\)\s*")
+"""A text that is all of it a word with brackets."""
+
+
+def _check_is_meant(resolver: Resolver, path: DataPath, text: ast.Text, span: Span) -> None:
+    """Warn of a text that would be said letter by letter and reads like a value: `pick(Hello | Hi)`."""
+    called = _CALLED.fullmatch(text.plain or "")
+    if called is None or called[1] not in resolver.words.quantifiers:
+        return
+    options = [option.strip().strip('"') for option in called[2].split("|")]
+    written = f"<{called[1]}({' | '.join(f'{chr(34)}{option}{chr(34)}' for option in options)})>"
+    edit = cures.over_part(resolver.findings.places, path, 0, None, written)
+    hint = (
+        cures.write(written, edit) if called[1] == "pick" and len(options) > 1 else "a value stands in `< >`"
+    )
+    message = f"`{text.plain}` is said letter by letter, as every text outside of `< >`"
+    resolver.findings.warning("W407", message, span, hint=hint)
 
 
 def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
