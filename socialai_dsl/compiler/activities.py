@@ -378,6 +378,10 @@ class Activities:
         If its argument finds nothing, on to `nothing`.
         """
         to, block, word = self.to, self.to.block, ACTIVITIES[activity.name]
+        if activity.until is not None:
+            with block.scratch():
+                to.sited_condition(SitedTerm(activity.until, activity.site, activity.span), otherwise)
+            return
         if not (word.lapses or word.act or activity.name in ("turn_to", "perform")):
             return
         to.site, block.span = activity.site, activity.span

@@ -540,7 +540,8 @@ class _FrameCompiler:
     @staticmethod
     def _skippable(step: StepPlan) -> bool:
         has_effects = step.sets or step.causes or step.say is not None
-        return ACTIVITIES[step.activity.name].lapses and not has_effects and step.ends_with_its_activity
+        lapses = step.activity.until is not None or ACTIVITIES[step.activity.name].lapses
+        return lapses and not has_effects and step.ends_with_its_activity
 
     def _end_step(self, to: Expressions, k: int) -> None:
         """The entry's effects and the next entry, once it has ended."""

@@ -269,6 +269,9 @@ class Look(Model):
     start: Expressions = Field(
         ("random",), description="its value at first, or a list with one for each; default random"
     )
+    ordered: bool = Field(
+        False, description="its values go from the least to the greatest: `a.size < b.size` compares them"
+    )
 
 
 class Frame(Model):
@@ -543,7 +546,7 @@ class UtteranceGrammar(Model):
         (),
         min_length=1,
         max_length=256,
-        description="the values of <noun>",
+        description="the values of <noun>; templates without slots need none",
         examples=[["the exit", "the wall"]],
     )
     slots: dict[Word, Fillers] = Field(

@@ -468,20 +468,15 @@ class _Planner:
         self.resolver.readings.entries[name] = step
         duration, lasted = self._duration((*path, "for"), step.for_, f"{address}.for")
         head = (step.do or "").partition("(")[0].strip()
-        endless = doing is not None and any(
-            name in ACTIVITIES and ACTIVITIES[name].endless for name in (doing.name, head)
-        )
+        # What only stays, and says or changes something, lasts one turn, as it does without `do`.
+        passing = doing is not None and doing.name == "stay" and bool(step.say or step.set or step.cause)
+        endless = doing is not None and head in ACTIVITIES and ACTIVITIES[head].endless and not passing
         unbounded = step.until is None and step.for_ is None and step.while_ is None  # the last is reported
         if step.do is not None and unbounded and endless:
             findings = self.resolver.findings
             message = f"`{step.do}` never ends by itself"
             hint: cures.Hint = "add `until:` or `for:`"
-            if doing is not None and doing.name == "stay" and (step.say or step.set or step.cause):
-                edit = cures.deleted(findings.places, (*path, "do"))
-                hint = cures.propose(
-                    f"delete `do: {step.do}`", edit, also="a step without it stays for one turn"
-                )
-            elif doing is not None and doing.name == "stay":
+            if doing is not None and doing.name == "stay":
                 hint = cures.add("for: 1", cures.added(findings.places, path, "for: 1"), also="or `until:`")
             findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)), hint=hint)
         return StepPlan(

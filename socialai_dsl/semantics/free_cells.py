@@ -35,8 +35,9 @@ class UnknownError(Exception):
 def interior_cells(region: Region, size: Size) -> list[Cell]:
     """Cells inside the walls that a region covers whose arguments read only the size, row by row."""
     args = [value(arg, size) for arg in region.args]
-    cells = product(range(1, size[1] - 1), range(1, size[0] - 1))
-    return [(x, y) for y, x in cells if _lies_in(region.name, args, (x, y), size)]
+    cells = ((x, y) for y, x in product(range(1, size[1] - 1), range(1, size[0] - 1)))
+    inside = [cell for cell in cells if _lies_in(region.name, args, cell, size)]
+    return inside if region.where is None else [cell for cell in inside if value(region.where, size, cell)]
 
 
 def wall_cells(region: Region, size: Size, side: str) -> set[Cell]:

@@ -38,12 +38,15 @@ class Region:
 
     `name` and `args`: anywhere; left_half, right_half, top_half, bottom_half; column(x); row(y); rect(x0, y0, x1, y1);
     next_to(entity), in_front_of(entity); wall (side in `side`, cells at least `margin` from its corners).
+    `where`: of these cells those for which it holds, which reads only the size of the room and the cell; of what the
+    room is built of.
     """
 
     name: RegionName
     args: tuple[Term, ...] = ()
     side: Side | None = None
     margin: int = 1
+    where: Term | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +78,9 @@ class Placing:
 
 @dataclass(frozen=True, slots=True)
 class Activity:
-    """One body action a turn, by the name of its signature; `wander` is a choose, `follow` a go_next_to.
+    """One body action a turn, by the name of its word; `wander` is a choose, `follow` a go_next_to.
 
+    `until`: it is finished when this holds, and before it begins if it holds then; None: as its word says.
     `weights` go with the args of choose. The args of perform are the elements of the sequence in turn, each as its move
     and its utterance.
     """
@@ -87,6 +91,7 @@ class Activity:
     span: Span
     weights: tuple[int, ...] = ()
     ordinal: int = 0
+    until: Term | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,14 +55,14 @@ def check_grammar(scenario: Scenario, findings: Findings) -> bool:
     """
     grammar = scenario.grammar
     span = findings.places.key_span(("grammar",))
-    if bool(grammar.nouns) == bool(grammar.slots):
-        message = (
-            "`grammar` has either `nouns` or `slots`" if grammar.nouns else "`grammar` needs a key `nouns`"
-        )
-        hint = "`nouns` are what `<noun>` can be; `slots` have names of their own" if grammar.nouns else None
-        findings.error("S107" if grammar.nouns else "S105", message, span, hint=hint)
+    if grammar.nouns and grammar.slots:
+        hint = "`nouns` are what `<noun>` can be; `slots` have names of their own"
+        findings.error("S107", "`grammar` has either `nouns` or `slots`", span, hint=hint)
         return False
-    names = [*grammar.slots] or ["noun"]
+    if not grammar.nouns and not grammar.slots and any("<noun>" in one for one in grammar.templates):
+        findings.error("S105", "`grammar` needs a key `nouns`", span)
+        return False
+    names = [*grammar.slots] or ["noun"] * bool(grammar.nouns)
     for i, template in enumerate(grammar.templates):
         path: DataPath = ("grammar", "templates", i)
         known = "|".join(map(re.escape, names))
@@ -74,7 +74,8 @@ def check_grammar(scenario: Scenario, findings: Findings) -> bool:
             width = len(other.group() if other else twice)
             message = f"a template has only one `{twice}`"
             if other:
-                filled = "one `<noun>`" if grammar.nouns else " and ".join(f"`<{name}>`" for name in names)
+                filled = " and ".join(f"`<{name}>`" for name in names) or "nothing"
+                filled = "one `<noun>`" if grammar.nouns else filled
                 message = f"a template has {filled} to fill, and no `{other.group()}`"
             near = did_you_mean(other.group()[1:-1], grammar.slots) if other else None
             suggestion = f"<{near}>" if near else None

@@ -37,6 +37,7 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     arithmetic,
+    as_number,
     between,
     equals,
     holds_nothing,
@@ -195,11 +196,29 @@ class ScenarioResolver(Resolver):
                 return self._membership(member, scope)
             same = self._same(node, scope)
             return same if node.op == "==" else _negated(same)
-        left = self.value(node.left, INT, scope)
-        right = self.value(node.right, INT, scope)
+        left, right = self._measured(node, scope)
         if node.op in (">", ">="):
             left, right = right, left
         return Compare("<" if node.op in ("<", ">") else "<=", left, right)
+
+    def _measured(self, node: ast.Compare, scope: Scope) -> tuple[Term, Term]:
+        """The sides of `<` and the like: numbers, or values of a look that go from the least to the greatest."""
+        if all(self.is_bare(side, scope) for side in (node.left, node.right)):
+            return self.value(node.left, INT, scope), self.value(node.right, INT, scope)
+        left, right = self.pair(node.left, node.right, scope)
+        if "look" not in (left.type.kind, right.type.kind):
+            return self.fit(left, INT, node.left, scope), self.fit(right, INT, node.right, scope)
+        look = left if left.type.kind == "look" else right
+        right = self.fit(right, look.type, node.right, scope)
+        left = self.fit(left, look.type, node.left, scope)
+        named = [name for name, one in self.symbols.scenario.looks.items() if one.words == look.type.words]
+        if not any(self.symbols.scenario.looks[name].ordered for name in named):
+            message = f"the values of `{named[0]}` have no order"
+            hint = (
+                f"`looks: {{{named[0]}: {{..., ordered: true}}}}` if they go from the least to the greatest"
+            )
+            raise self.fail("S204", message, node, scope, hint=hint)
+        return as_number(left), as_number(right)
 
     def _same(self, node: ast.Compare, scope: Scope) -> Term:
         """Whether both sides of a comparison are the same; `none` is what a register holds that holds nothing."""

@@ -429,7 +429,7 @@ class Symbols:
         """What the agent can say."""
         grammar = self.scenario.grammar
         slots = [Slot(name, slot.words.words) for name, slot in self.slots.items()]
-        if not grammar.slots:
+        if grammar.nouns:
             slots = [Slot(NOUN, tuple(map(str, grammar.nouns)))]
         return Sentences.of(grammar.templates, slots)
 

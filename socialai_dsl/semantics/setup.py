@@ -33,12 +33,18 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     CellBeside,
     CellOf,
+    Compare,
     Const,
     FieldOf,
+    Here,
+    Logic,
     Measure,
+    Not,
     ObjectType,
+    Operation,
     Read,
     Sees,
+    Select,
     SitedTerm,
     Term,
     Test,
@@ -234,17 +240,24 @@ def _built_regions(
     resolver: Resolver, path: DataPath, raw: str, type_: ObjectType
 ) -> Iterator[tuple[ObjectType, Region, Span]]:
     findings, scope = resolver.findings, reset_scope(path)
-    node = findings.expression(path, raw)
+    node, where = findings.expression(path, raw), None
     if isinstance(node, ast.FilteredRegion):
-        hint = "build the rest by several places: `row(3) | column(2)`, or by `rect(x0, y0, x1, y1)`"
-        raise findings.fail("S204", "what is built has no `where`", findings.at(path), hint=hint)
+        where = resolver.value(node.where, BOOL, replace(scope, here=True))
+        node = node.region
     for part in _regions(resolver, node, scope):
-        reads = [t for t in walk(part.args) if not isinstance(t, World) and (hasattr(t, "path") or draws(t))]
-        if reads or part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args):
+        drawn = part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args)
+        if drawn or not all(map(_follows_from_size, walk((part.args, where)))):
             message = "what is built into the room depends on its size alone"
-            hint = "use W and H, and put what is drawn in `objects`"
+            hint = "use W and H, and `here` behind `where`; put what is drawn in `objects`"
             raise findings.fail("S204", message, findings.at(path), hint=hint)
-        yield type_, part, findings.at(path)
+        yield type_, replace(part, where=where), findings.at(path)
+
+
+def _follows_from_size(term: Term) -> bool:
+    """Whether a term, apart from what it is made of, is known of a cell once the size of the room is."""
+    if isinstance(term, Here):
+        return term.name != "cell"
+    return isinstance(term, Const | World | Operation | Compare | Not | Logic | Select)
 
 
 # -- the order: what something needs comes before it ---------------------------------------------------------

@@ -63,12 +63,10 @@ def shared_space(
     _check_looks(names, members, places, bag)
     own = [member.sentences for member in members]
     written = None if isinstance(suite.grammar, str) else suite.grammar
-    if written is not None and bool(written.nouns) == bool(written.slots):
-        span = places.key_span(("grammar",))
-        if written.nouns:
-            bag.error("S107", "`grammar` has either `nouns` or `slots`", span)
-        else:
-            bag.error("S105", "`grammar` needs a key `nouns`", span)
+    if written is not None and written.nouns and written.slots:
+        bag.error("S107", "`grammar` has either `nouns` or `slots`", places.key_span(("grammar",)))
+    elif written is not None and not written.nouns and any("<noun>" in one for one in written.templates):
+        bag.error("S105", "`grammar` needs a key `nouns`", places.key_span(("grammar",)))
     templates, template_maps = _shared(
         suite.grammar, written.templates if written else (), [one.templates for one in own]
     )
@@ -105,7 +103,7 @@ def _slots(written: UtteranceGrammar | None, own: Sequence[Sentences]) -> dict[s
     """The slots of a suite by name, in the order in which members have them, with words that are written there."""
     if written is None:
         return {slot.name: () for one in own for slot in one.slots}
-    fillers = dict(written.slots) or {NOUN: written.nouns}
+    fillers = dict(written.slots) or ({NOUN: written.nouns} if written.nouns else {})
     return {name: tuple(str(word) for word in words) for name, words in fillers.items()}
 
 

@@ -110,6 +110,7 @@ class Activity:
     acting: bool = False  # this turn is that of the toggle, the push, the pickup or the drop itself
     done_before: bool = False  # of hands: what they were for was so before this turn
     sees: Callable[[], bool] = bool  # of a search: whether it sees what it looks for now
+    away: Callable[[], bool] = bool  # of going away: whether that is far enough away now
 
     def primitive(self, world: World, me: Entity) -> str:
         """The body action it asks for now."""
@@ -174,6 +175,7 @@ class Activity:
             "follow": go_next_to,
             "stay_near": go_next_to,
             "flee": flee,
+            "go_away_from": flee,
             "go_to": go_to,
             "go_next_to": go_next_to,
             "use": use,
@@ -194,8 +196,8 @@ class Activity:
         """Whether what it goes for is reached already."""
         if self.verb in ("go_to", "enter"):
             return geometry.at(world, me, self.goal)
-        if self.verb == "search":
-            return self.sees()
+        if self.verb in ("search", "go_away_from"):
+            return self.sees() if self.verb == "search" else self.away()
         return self.verb == "go_next_to" and geometry.next_to(world, me, self.goal)
 
     def finished(self, world: World, me: Entity) -> bool:
@@ -206,7 +208,7 @@ class Activity:
             return self.done_before or (self.acting and me.action == act and full == (act == "pickup"))
         if self.verb in ("use", "push"):
             return self.acting and me.action == ("toggle" if self.verb == "use" else "forward")
-        if self.verb in ("go_to", "enter", "go_next_to", "search"):
+        if self.verb in ("go_to", "enter", "go_next_to", "search", "go_away_from"):
             return self.fulfilled(world, me)
         if self.verb == "perform":
             return me.clock >= len(self.goal.elements)
@@ -226,12 +228,16 @@ def plan(value: Value, context: Context) -> Activity:
         return Activity(node.id)
     assert isinstance(node, ast.Call), "internal: no activity"
     if node.name == "search":
-        return Activity("search", sees=partial(sees, replace(node, name="sees"), context))
+        return Activity("search", sees=partial(holds, replace(node, name="sees"), context))
+    if node.name == "go_away_from":
+        thing, far = node.args
+        apart = ast.Compare(">=", ast.Call("distance", (thing,), at=node.at), far, at=node.at)
+        return Activity("go_away_from", there(of(thing, context)), away=partial(holds, apart, context))
     return Activity(node.name, *(there(of(argument, context)) for argument in node.args))
 
 
-def sees(condition: ast.Call, context: Context) -> bool:
-    """Whether what is searched for is in view; what is not found is not."""
+def holds(condition: ast.Expr, context: Context) -> bool:
+    """Whether something is so; of what is not found, nothing is."""
     try:
         return bool(there(of(condition, context)))
     except NothingFoundError:

@@ -309,6 +309,15 @@ def there(value: Any) -> Any:
     return value
 
 
+def _ordered(node: ast.Compare, context: Context) -> tuple[str, ...] | None:
+    """The values of the look that a comparison is about, from the least to the greatest; None if it is about none."""
+    for side in (node.left, node.right):
+        name = side.name if isinstance(side, ast.Attribute) else side.id if isinstance(side, ast.Name) else ""
+        if name in context.world.look_names:
+            return context.world.look_names[name]
+    return None
+
+
 def _compare(node: ast.Compare, context: Context) -> bool:
     left, right = of(node.left, context), of(node.right, context)
     sides = ((left, node.right), (right, node.left))
@@ -318,6 +327,8 @@ def _compare(node: ast.Compare, context: Context) -> bool:
         equal = any(same(a, b) for a in as_list(left) for b in as_list(right))
         return equal == (node.op == "==")
     left, right = there(left), there(right)
+    if (words := _ordered(node, context)) is not None:
+        left, right = words.index(left), words.index(right)
     if not isinstance(left, int) or not isinstance(right, int):
         return False  # a noun that is no number is neither more nor less than anything
     return {"<": left < right, "<=": left <= right, ">": left > right, ">=": left >= right}[node.op]

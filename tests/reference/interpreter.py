@@ -98,7 +98,7 @@ class Reference:
                 "pointing" in name or name == "last_act" for name in scenario.observe.channels or ()
             ),
             hands=self.shows_hands(),
-            look_names=frozenset(scenario.looks),
+            look_names={name: look.words for name, look in scenario.looks.items()},
             tone=scenario.observe.tone,
             shown_looks={
                 name: look.words

@@ -231,6 +231,7 @@ class Look:
     for_: Any
     words: tuple[str, ...]
     start: Any = "random"
+    ordered: bool = False
 
 
 @dataclass(frozen=True)

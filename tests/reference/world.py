@@ -255,7 +255,7 @@ class World:
     gestures: int = 0  # how many channels of the picture show them
     hands: bool = False  # whether it shows what NPCs carry
     tone: str | None = None  # the look whose word is heard before what NPCs say
-    look_names: frozenset[str] = frozenset()
+    look_names: dict[str, tuple[str, ...]] = field(default_factory=dict)
     shown_looks: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words of those that it shows
     canvas: tuple[int, int] = (0, 0)
     bonus: int = 0  # per cent that rules pay in this step

@@ -184,7 +184,8 @@ class _Author:
         if self.often(0.3):
             kind = self.rng.choice(("wall", "fence", "lava"))
             place = self.rng.choice(("rect(3, 3, 3, 4)", "row(H // 2) where here.x > 3", "column(2)"))
-            made["build"] = [{kind: place.partition(" where ")[0]}]
+            where = f" where here.x % {self.rng.randint(2, 3)} == 0 and not here.y == H // 2"
+            made["build"] = [{kind: place.partition(" where ")[0] + where * self.often(0.4)}]
         if self.often(0.2):
             made["occlusion"] = True
         return made
@@ -338,9 +339,10 @@ class _Author:
         for name, words in LOOKS.items():
             if self.often(0.75):
                 continue
-            look = Look(name, self.rng.choice([*several, "cast", "cast"]), words)
+            look = Look(name, self.rng.choice([*several, "cast", "cast"]), words, self.often(0.5))
             self.declared.looks.append(look)
             made[name] = {"for": look.of, "words": list(words)}
+            made[name] |= {"ordered": True} if look.ordered else {}
             if self.often(0.5):
                 drawn = f"pick({words[0]} | 2 * {words[1]})"
                 starts = ("random", words[0], drawn, f"{words[1]} if W > 6 else {words[0]}")

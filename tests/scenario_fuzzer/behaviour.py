@@ -221,6 +221,12 @@ class Behaviour:
 
     # -- activities --------------------------------------------------------------------------------------------
 
+    def _near_or_away(self, where: Where) -> str:
+        """Up to some distance of something; what somebody goes away from is not drawn anew in each turn."""
+        of, far = self.phrases.entity(where), self.rng.randint(1, 4)
+        verb = "stay_near" if "pick(" in of else self.rng.choice(("stay_near", "go_away_from"))
+        return f"{verb}({of}, {far})"
+
     def activity(self, where: Where) -> str:
         """What to do in a turn."""
         rng, phrases = self.rng, self.phrases
@@ -232,7 +238,7 @@ class Behaviour:
             lambda: rng.choice(
                 ("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")
             ),
-            lambda: f"stay_near({phrases.entity(where)}, {rng.randint(1, 4)})",
+            lambda: self._near_or_away(where),
             lambda: f"turn_to({phrases.direction(where)})",
             lambda: f"{rng.choice(('face', *(['point_at'] if points else [])))}({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",

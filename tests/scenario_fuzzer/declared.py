@@ -48,6 +48,7 @@ class Look:
     name: str
     of: str
     words: tuple[str, ...]
+    ordered: bool = False
 
 
 @dataclass

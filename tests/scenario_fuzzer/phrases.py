@@ -484,6 +484,13 @@ class Phrases:
             lambda: f"{self.look(look, where)} != {self.look(look, where)}",
             lambda: f"{self.look(look, where)} in {one} | {other}",
         ]
+        if look.ordered:
+            than = self.rng.choice(("<", "<=", ">", ">="))
+            options += [lambda: f"{self.look(look, where)} {than} {self.look(look, where)}"]
+            options += [
+                lambda: f"{self.look(look, where)} {than} {one}",
+                lambda: f"{one} {than} {self.look(look, where)}",
+            ]
         if not (where.reset or where.still or where.variables):
             options.append(lambda: f"prev(agent.{look.name} == {one})" if look.of == "cast" else "t > 3")
         return self.one_of(*options)

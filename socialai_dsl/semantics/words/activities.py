@@ -12,7 +12,7 @@ from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.plans import Activity
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, quoted, with_article
+from socialai_dsl.semantics.scope import FailedError, Macro, Scope, quoted, with_article
 from socialai_dsl.semantics.signatures import Argument, Signature
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -24,6 +24,7 @@ from socialai_dsl.semantics.terms import (
     Measure,
     Term,
     Type,
+    draws,
     entity,
 )
 from socialai_dsl.semantics.words.statuses import status_of
@@ -56,15 +57,16 @@ class Doing:
 
     def one(self, place: int) -> Term:
         """Somebody or something that it is about; not a group, of which it is not said which one is meant."""
-        self._say_which(place)
+        self.say_which(place)
         return self.resolver.value(self.args[place], ENTITY, self.scope)
 
     def somewhere(self, place: int) -> Term:
         """The same, or a cell."""
-        self._say_which(place)
+        self.say_which(place)
         return self.resolver.somewhere(self.args[place], self.scope)
 
-    def _say_which(self, place: int) -> None:
+    def say_which(self, place: int) -> None:
+        """Report a group where one of it is meant."""
         node = self.args[place]
         if groups.is_group(self.resolver, node, self.scope):
             group, more = quoted(node), ", ..." if len(self.word.takes) > 1 else ""
@@ -204,6 +206,29 @@ def _wander(doing: Doing) -> Activity:
     return _choice(doing, parse_expression("forward | left | right"))
 
 
+def _composed(parameters: str, does: str, until: str) -> Callable[[Doing], Activity]:
+    """An activity that is another one until a condition holds, both written in the language."""
+    named, deed, ends = parameters.split(), parse_expression(does), parse_expression(until)
+    assert isinstance(deed, ast.Call), "internal: an activity with arguments"
+
+    def meaning(doing: Doing) -> Activity:
+        for place, takes in enumerate(doing.word.takes):
+            if takes == "entity":
+                doing.say_which(place)
+        variables = {name: Macro(arg, doing.scope) for name, arg in zip(named, doing.args, strict=True)}
+        inner = replace(doing.scope, variables=variables)
+        word = next(word for word in ACTIVITIES if word.name == deed.name)
+        done = word.meaning(replace(doing, word=word, args=deed.args, scope=inner))
+        if any(map(draws, done.args)):
+            message = (
+                f"`{doing.word.name}` asks in every turn what it is about, so nothing can be drawn in it"
+            )
+            raise doing.fail("S204", message, hint="draw it in `let`, and use that")
+        return replace(done, until=doing.resolver.value(ends, BOOL, inner))
+
+    return meaning
+
+
 def _choice(doing: Doing, node: ast.Expr) -> Activity:
     ordinal = doing.scope.draws.number()
     members = groups.group(doing.resolver, _with_stay(node), ACTION, doing.scope)
@@ -280,6 +305,9 @@ ACTIVITIES: Final = (
     _deed("follow", ("entity",), "walk next to x, again and again", endless=True, meaning=_follow),
     _deed("stay_near", ("entity", "int"), "walk towards x while it is more than n cells away", endless=True),
     _deed("flee", ("entity",), "turn away from x and walk", endless=True),
+    _deed("go_away_from", ("entity", "int"), "turn away from x and walk, until x is n cells away", lapses=True,
+          also=("go_away", "leave", "avoid", "keep_away_from", "get_away_from", "walk_away_from"),
+          meaning=_composed("x n", does="flee(x)", until="distance(x) >= n")),
     _deed("perform", ("sequence",), "one act of a sequence a turn, words included", also=("dance", "repeat"),
           meaning=_perform),
     _deed("choose", ("actions",), "one at random: choose(a | b | 2 * c)", endless=True, meaning=_choose),
