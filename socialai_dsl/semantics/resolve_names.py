@@ -13,7 +13,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
 from socialai_dsl.semantics import object_facts, rows, slots, texts
 from socialai_dsl.semantics.groups import check_moment, must_be_agent, subject_of
-from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
+from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver, text_value
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
@@ -27,6 +27,7 @@ from socialai_dsl.semantics.scope import (
     drawn,
     of_each,
     quoted,
+    select,
     usage,
     words_of,
 )
@@ -216,10 +217,28 @@ def _substituted(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """A slot that is put in wherever it is used: bool ones as conditions, texts only where something is said."""
     frame = scope.frame
     assert frame is not None, "internal: a slot outside a frame"
-    if frame.model.slots[node.id] != "bool":
-        message = f"`{node.id}` is a text: it can be said or heard, not computed with"
+    if frame.model.slots[node.id] == "bool":
+        return member_truth(resolver, frame, node.id, scope)
+    if frame.model.slots[node.id] == "text":
+        return _member_text(resolver, frame, node, scope)
+    message = f"`{node.id}` is an utterance: it can be said or heard, not computed with"
+    raise resolver.fail("S204", message, node, scope)
+
+
+def _member_text(resolver: Resolver, frame: PlayedFrame, node: ast.Name, scope: Scope) -> Term:
+    """The text that fills a slot, in the file that was drawn if there are several; with `<...>` it can only be said."""
+    paths = frame.texts[node.id]
+    if paths is None:
+        raise FailedError  # nobody fills it, which is reported where it is left empty
+    texts_ = [str(resolver.findings.part(path)) for path in paths]
+    if not all(
+        resolver.findings.text(path, text).plain is not None for path, text in zip(paths, texts_, strict=True)
+    ):
+        message = (
+            f"`{node.id}` is filled with a text that has <...>: it can be said or heard, not computed with"
+        )
         raise resolver.fail("S204", message, node, scope)
-    return member_truth(resolver, frame, node.id, scope)
+    return select(resolver.registers.drawn_file(frame.member), [text_value(text) for text in texts_])
 
 
 def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope) -> Term:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.groups import WIDE, values_of
 from socialai_dsl.semantics.resolver import ANY_TEXT, Resolver
 from socialai_dsl.semantics.scope import (
@@ -158,22 +159,37 @@ def _as_values(words: list[str]) -> tuple[Term, ...]:
 def _permuted(
     resolver: Resolver, name: str, raw: str, path: DataPath
 ) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-    """`permuted(other)`: the keys of another table with its values in an order that is drawn at reset."""
+    """`permuted(other)`: the keys of another table, its values in an order that is drawn at reset; `permuted(a | b)`:
+    the numbers from 1 with one of the group each.
+    """
     node = resolver.findings.expression(path, raw)
-    match node:
-        case ast.Call(name="permuted", args=(ast.Name(id=other),), subject=None):
-            pass
-        case _:
-            message = "a table is written out, or permuted(another table)"
-            raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    if not (
+        isinstance(node, ast.Call)
+        and node.name == "permuted"
+        and node.subject is None
+        and len(node.args) == 1
+    ):
+        message = "a table is written out, or permuted(another table), or permuted(a | b | c)"
+        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    (of,) = node.args
     known = resolver.symbols.scenario.tables
-    if other not in known or isinstance(known[other], str):
-        near = did_you_mean(other, [key for key, value in known.items() if not isinstance(value, str)])
-        message = f"`{other}` is not a table that is written out"
-        span = resolver.findings.node(path, node.args[0])
-        raise resolver.findings.no_such(other, message, span, suggestion=near)
-    resolver.used.add(("tables", other))
-    keys, values = table(resolver, other)
+    if isinstance(of, ast.Name) and of.id in known and not isinstance(known[of.id], str):
+        resolver.used.add(("tables", of.id))
+        keys, values = table(resolver, of.id)
+    elif groups.is_group(resolver, of, reset_scope(path)):
+        members = groups.group(resolver, of, None, reset_scope(path))
+        if members.bounds is not None:
+            message = f"`{quoted(of)}` is no group that is known beforehand"
+            raise resolver.findings.fail("S204", message, resolver.findings.node(path, of))
+        keys, values = tuple(str(1 + k) for k in range(len(members.items))), members.items
+    else:
+        near = did_you_mean(quoted(of), [key for key, value in known.items() if not isinstance(value, str)])
+        message = f"`{quoted(of)}` is not a table that is written out, and no group"
+        span = resolver.findings.node(path, of)
+        hint = "`permuted(ann | bob | agent)` has one of them for each of the numbers from 1"
+        raise resolver.findings.no_such(
+            quoted(of), message, span, suggestion=near, hint=None if near else hint
+        )
     order = permutation(resolver, f"tables.{name}", len(keys), path)
     return keys, tuple(chosen(place, range(len(values)), values, values[0].type) for place in order)
 

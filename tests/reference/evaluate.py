@@ -263,6 +263,8 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return subject.filled.get(name)
     if name == "cell":
         return NO_CELL if subject.cell is None else subject.cell
+    if name == "kind" and subject.sort == "object":
+        return subject.type
     if name in ("kind", "index", "gone", "poked", "was_poked", "action", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":

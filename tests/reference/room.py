@@ -374,11 +374,17 @@ class Setup:
         if name in tables:
             return
         if not isinstance(written, dict):
-            other = str(written).strip().removeprefix("permuted(").removesuffix(")").strip()
-            self.compute_table(other)
-            values = list(tables[other].values())
+            value = self.sources.name(f"tables.{name}", written)
+            assert isinstance(value.tree, ast.Call)
+            (other,) = value.tree.args
+            if isinstance(other, ast.Name) and other.id in self.scenario.tables:
+                self.compute_table(other.id)
+                keys, values = list(tables[other.id]), list(tables[other.id].values())
+            else:
+                values = as_list(evaluate(Value(f"tables.{name}", other), self.context()))
+                keys = [str(1 + k) for k in range(len(values))]
             order = self.permutation(f"tables.{name}", len(values))
-            tables[name] = {key: values[n] for key, n in zip(tables[other], order, strict=True)}
+            tables[name] = {key: values[n] for key, n in zip(keys, order, strict=True)}
             return
         tables[name] = {
             str(key): evaluate(self.sources.name(f"tables.{name}.{key}", value), self.context())

@@ -302,9 +302,9 @@ class Grammar:
     fillers: dict[str, list[Filler]] = field(default_factory=dict)
 
     def utterance(self, template: int, *choices: int) -> str:
-        """The text of a template with a word in each of its slots."""
+        """The text of a template with a word in each of its slots; a grammar without slots leaves one choice of one."""
         text = self.templates[template]
-        for (slot, fillers), choice in zip(self.fillers.items(), choices, strict=True):
+        for (slot, fillers), choice in zip(self.fillers.items(), choices[: len(self.fillers)], strict=True):
             text = text.replace(f"<{slot}>", fillers[choice].word)
         return text
 
@@ -324,7 +324,8 @@ class Grammar:
     def meant(self, template: int, *choices: int) -> tuple[int, ...]:
         """The same without choices for slots that the template lacks."""
         has = (slot == "noun" or f"<{slot}>" in self.templates[template] for slot in self.fillers)
-        return (template, *(choice if its else 0 for choice, its in zip(choices, has, strict=True)))
+        chosen = zip(choices[: len(self.fillers)], has, strict=True)
+        return (template, *(choice if its else 0 for choice, its in chosen))
 
 
 @dataclass(frozen=True)
@@ -451,7 +452,7 @@ def of_data(
 
 def fillers_of(script: Script) -> dict[str, list[Filler]]:
     """What each slot of the grammar can be."""
-    written = script.grammar.slots or {"noun": script.grammar.nouns}
+    written = script.grammar.slots or ({"noun": script.grammar.nouns} if script.grammar.nouns else {})
     return {
         slot: [f for entry in many(entries) for f in fillers_of_entry(script, entry)]
         for slot, entries in written.items()

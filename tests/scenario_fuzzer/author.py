@@ -300,7 +300,15 @@ class _Author:
             "words": dict(zip(COLORS, self.rng.sample(WORDS, len(WORDS)), strict=True)),
             "other": "permuted(words)",
             "rank": {color: self.rng.randint(0, 5) for color in COLORS},
-        }
+        } | self._turns()
+
+    def _turns(self) -> dict[str, str]:
+        """Members of the cast in an order that is drawn."""
+        several = ["agent", *self.declared.members]
+        if len(several) < 2:
+            return {}
+        self.declared.turns = len(several)
+        return {"turns": f"permuted({' | '.join(several)})"}
 
     def lets(self) -> dict[str, Any]:
         """What is drawn once."""

@@ -96,6 +96,7 @@ class Declared:
     memories: dict[str, str] = field(default_factory=dict)  # memory: a sequence of its length
     tables: list[str] = field(default_factory=list)  # colour -> word
     ranks: list[str] = field(default_factory=list)  # colour -> number
+    turns: int = 0  # for how many numbers the table `turns` has a member of the cast
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
     carried: list[Thing] = field(default_factory=list)  # what can be carried
     looks: list[Look] = field(default_factory=list)

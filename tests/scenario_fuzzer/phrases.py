@@ -355,6 +355,7 @@ class Phrases:
         )
         simple += [self.of_rows, self.of_rows] if not where.reset else []
         simple += [self.of_looks, self.of_looks] if self.declared.looks else []
+        simple += [self.of_turns, self.of_turns] if self.declared.turns and not where.reset else []
         simple += [self.quantified, self.quantified] if not where.searching else []
         simple += (
             [self.defined]
@@ -372,8 +373,13 @@ class Phrases:
 
     def plain_condition(self, where: Where) -> str:
         """A condition on places, looks, statuses and values."""
-        made = (self.relation, self.relation, self.status, self.comparison)
+        made = (self.relation, self.relation, self.status, self.comparison, self.of_kind)
         return self.chosen(lambda: self.rng.choice(made)(where), where)
+
+    def of_kind(self, where: Where) -> str:
+        """What sort of thing, or who, something is."""
+        kinds = dict.fromkeys(["peer", *(thing.type for thing in self.declared.things)])
+        return f"{self.entity(where)}.kind == {self.rng.choice([*kinds])}"
 
     def sought(self, where: Where) -> str:
         """What can be seen: one thing, a group, or a cell."""
@@ -474,6 +480,11 @@ class Phrases:
         if look.of == "cast" and where.frame is not None and self.often(0.3):
             return look.name
         return f"{self.bearer(look, where)}.{look.name}"
+
+    def of_turns(self, where: Where) -> str:
+        """Whose turn it is."""
+        number = self.rng.choice((1, 2, f"t % {self.declared.turns} + 1"))
+        return f"turns({number}) == {self.rng.choice(['agent', *self.declared.members])}"
 
     def of_looks(self, where: Where) -> str:
         """What something looks like."""

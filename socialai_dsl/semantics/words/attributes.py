@@ -6,7 +6,7 @@ from typing import Final
 
 from socialai_dsl.semantics import hands, object_facts
 from socialai_dsl.semantics.groups import check_points
-from socialai_dsl.semantics.resolver import Resolver
+from socialai_dsl.semantics.resolver import Resolver, text_value
 from socialai_dsl.semantics.scope import of_each
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -91,10 +91,11 @@ def _name(use: Use) -> Term:
 
 
 def _kind(use: Use) -> Term:
-    kinds = {_kind_of(use.resolver, each) for each in use.about().type.values}
-    if len(kinds) > 1:
-        raise use.fail("S204", "`kind` is known of one thing, or of things of one kind")
-    return Const(Type("text", 0, 0, (kinds.pop(),)), 0)
+    who = use.about()
+    kinds = {each: _kind_of(use.resolver, each) for each in numbers_of(who)}
+    if len({*kinds.values()}) == 1:
+        return text_value(next(iter(kinds.values())))
+    return of_each(who, [text_value(kind) for kind in kinds.values()])
 
 
 def _kind_of(resolver: Resolver, entity: int) -> str:
