@@ -169,7 +169,7 @@ def _permuted(
         and node.subject is None
         and len(node.args) == 1
     ):
-        message = "a table is written out, or permuted(another table), or permuted(a | b | c)"
+        message = "a table is written out, or permuted(another table), or permuted(group)"
         raise resolver.findings.fail("S204", message, resolver.findings.at(path))
     (of,) = node.args
     known = resolver.symbols.scenario.tables
@@ -184,12 +184,12 @@ def _permuted(
         keys, values = tuple(str(1 + k) for k in range(len(members.items))), members.items
     else:
         near = did_you_mean(quoted(of), [key for key, value in known.items() if not isinstance(value, str)])
-        message = f"`{quoted(of)}` is not a table that is written out, and no group"
+        message = f"`{quoted(of)}` is not a table that is written out"
         span = resolver.findings.node(path, of)
-        hint = "`permuted(ann | bob | agent)` has one of them for each of the numbers from 1"
-        raise resolver.findings.no_such(
-            quoted(of), message, span, suggestion=near, hint=None if near else hint
+        hint = (
+            None if near else "`permuted(ann | bob | agent)` has one of them for each of the numbers from 1"
         )
+        raise resolver.findings.no_such(quoted(of), message, span, suggestion=near, hint=hint)
     order = permutation(resolver, f"tables.{name}", len(keys), path)
     return keys, tuple(chosen(place, range(len(values)), values, values[0].type) for place in order)
 

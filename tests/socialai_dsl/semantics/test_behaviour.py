@@ -211,7 +211,7 @@ NEEDS = {
     **dict.fromkeys(
         (
             *("go_to(toy)", "go_next_to(toy)", "search(toy)", "follow(guide)", "flee(guide)", "wander"),
-            *("stay_near(guide, 2)", "push(stone, up)", "enter(mat)"),
+            *("stay_near(guide, 2)", "go_away_from(guide, 2)", "push(stone, up)", "enter(mat)"),
         ),
         ("left", "right", "forward"),
     ),
