@@ -203,11 +203,9 @@ class ScenarioResolver(Resolver):
 
     def _measured(self, node: ast.Compare, scope: Scope) -> tuple[Term, Term]:
         """The sides of `<` and the like: numbers, or values of a look that go from the least to the greatest."""
-        if all(self.is_bare(side, scope) for side in (node.left, node.right)):
+        if not any(self._names_look(side) for side in (node.left, node.right)):
             return self.value(node.left, INT, scope), self.value(node.right, INT, scope)
         left, right = self.pair(node.left, node.right, scope)
-        if "look" not in (left.type.kind, right.type.kind):
-            return self.fit(left, INT, node.left, scope), self.fit(right, INT, node.right, scope)
         look = left if left.type.kind == "look" else right
         right = self.fit(right, look.type, node.right, scope)
         left = self.fit(left, look.type, node.left, scope)
@@ -219,6 +217,13 @@ class ScenarioResolver(Resolver):
             )
             raise self.fail("S204", message, node, scope, hint=hint)
         return as_number(left), as_number(right)
+
+    def _names_look(self, node: ast.Expr) -> bool:
+        """Whether an expression is `x.size`, or in a frame `size`, of a look of this name."""
+        name = (
+            node.name if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else None
+        )
+        return name in self.symbols.scenario.looks
 
     def _same(self, node: ast.Compare, scope: Scope) -> Term:
         """Whether both sides of a comparison are the same; `none` is what a register holds that holds nothing."""

@@ -545,8 +545,15 @@ def may_be_nothing(term: Term) -> bool:
 
 def where_there_is(needed: Term, result: Term) -> Term:
     """A value that follows from another, which is asked for first: of an empty register nothing is found."""
-    if not may_be_nothing(needed):
-        return result
+    return _asking_first(needed, result) if may_be_nothing(needed) else result
+
+
+def where_it_is_found(needed: Term, result: Term) -> Term:
+    """The same of a value that does not depend on what the other is, only on whether there is one."""
+    return _asking_first(needed, result) if may_be_nothing(needed) or may_find_nothing(needed) else result
+
+
+def _asking_first(needed: Term, result: Term) -> Term:
     never = Compare("<", needed, Const(needed.type, needed.type.low))
     return Select(result.type, (never,), (Const(result.type, result.type.low),), result)
 

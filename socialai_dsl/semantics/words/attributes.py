@@ -92,10 +92,7 @@ def _name(use: Use) -> Term:
 
 def _kind(use: Use) -> Term:
     who = use.about()
-    kinds = {each: _kind_of(use.resolver, each) for each in numbers_of(who)}
-    if len({*kinds.values()}) == 1:
-        return text_value(next(iter(kinds.values())))
-    return of_each(who, [text_value(kind) for kind in kinds.values()])
+    return of_each(who, [text_value(_kind_of(use.resolver, each)) for each in numbers_of(who)])
 
 
 def _kind_of(resolver: Resolver, entity: int) -> str:
