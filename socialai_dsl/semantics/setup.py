@@ -50,7 +50,6 @@ from socialai_dsl.semantics.terms import (
     Test,
     World,
     chosen,
-    draws,
     walk,
 )
 from socialai_dsl.semantics.words import PLACES
