@@ -43,7 +43,15 @@ def test_everything_that_ships_and_the_cookbook_are_offered_with_what_they_are_a
 
 @pytest.mark.parametrize(
     "name",
-    ["talkitout", "diverse_exit", "novel/sally_anne", "school/boxes", "cookbook/random_cast", "social_env"],
+    [
+        "classics/director_task",
+        "talkitout",
+        "diverse_exit",
+        "novel/sally_anne",
+        "school/boxes",
+        "cookbook/random_cast",
+        "social_env",
+    ],
 )
 def test_a_copy_is_sound_has_its_script_and_is_made_again_beside_itself(tmp_path: Path, name: str) -> None:
     stem = name.rpartition("/")[2]
