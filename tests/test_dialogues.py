@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.evaluation.testing import PlayedTest, play_tests
+from socialai_dsl.evaluation.scenario_tests import PlayedTest, play_tests
 from socialai_dsl.frontend import check
 from socialai_dsl.loader.resolved import TESTS
 from tests.scenarios.playing import BEYOND

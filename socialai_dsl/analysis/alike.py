@@ -14,9 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.advance import advance, begin_those_possible
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import wins_of
+from socialai_dsl.analysis.rooms import DrawnRooms, Plan
 from socialai_dsl.analysis.search import digests_of, multipliers
 from socialai_dsl.envs.table import Start, Table
 from socialai_dsl.program import Program, Register
@@ -25,13 +24,29 @@ ROOMS: Final = 4096
 """How many rooms are drawn to find some that look alike, at least."""
 
 
-def many_rooms(program: Program, rooms: int, seed: int) -> Table:
-    """A table in which as many rooms of a seed have begun as are drawn to compare them; those that cannot be drawn have
-    ended.
+def many_rooms(program: Program, rooms: int, seed: int) -> DrawnRooms:
+    """As many rooms of a seed as are drawn to compare them; those that cannot be drawn have ended."""
+    return DrawnRooms.numbered(program, max(rooms, ROOMS), seed, all_possible=False)
+
+
+def like_first(table: Table, size: int | None = None) -> NDArray[np.bool_]:
+    """Whether each row of a group shows the same and sounds the same as its first, bool (groups, size).
+
+    Args:
+        table: the rows.
+        size: how many rows, one after the other, are a group; None: all are one.
     """
-    table = Table([program], max(rooms, ROOMS))
-    begin_those_possible(table, seed)
-    return table
+    state, size = table.state, size or table.rows
+    same = np.ones((table.rows // size, size), np.bool_)
+    for array in (state.image, state.extra, state.tokens):
+        grouped = array.reshape(*same.shape, -1)
+        same &= (grouped == grouped[:, :1]).all(axis=2)
+    return same
+
+
+def pairs_alike(table: Table) -> NDArray[np.bool_]:
+    """Whether rows 2k and 2k + 1 show the same and sound the same, (pairs,)."""
+    return like_first(table, 2)[:, 1]
 
 
 def perceived_so_far(table: Table) -> NDArray[np.uint64]:
@@ -79,7 +94,8 @@ def divided(program: Program, rooms: int, seed: int) -> tuple[int, list[Division
         In how many groups of rooms that look alike the script had to decide, in the step with most groups; and where it
         failed to decide alike.
     """
-    table = many_rooms(program, rooms, seed)
+    drawn = many_rooms(program, rooms, seed)
+    table = drawn.table
     history = perceived_so_far(table)
     divisions: list[Division] = []
     most, step = 0, 0
@@ -99,8 +115,7 @@ def divided(program: Program, rooms: int, seed: int) -> tuple[int, list[Division
             second = int(going[otherwise & (group_of == group)].min())
             members = tuple(going[group_of == group].tolist())
             divisions.append(Division((int(first[group]), second), step, members))
-        table.batch.ports.actions[:] = actions
-        advance(table)
+        drawn.do(actions)
         history = _mixed([history, acts, perceived_so_far(table)])
         # Those that were treated otherwise have been reported.
         table.state.registers[going[np.isin(group_of, group_of[otherwise])], Register.ENDED] = 1
@@ -132,16 +147,12 @@ class Lookalikes:
     """
 
     def __init__(self, program: Program, rooms: int, seed: int) -> None:
-        self._table = many_rooms(program, rooms, seed)
-        state = self._table.state
-        self._registers, self._boards = state.registers.copy(), state.boards.copy()
-        self._keys = state.keys.copy()
-        self._drawn = state.registers[:, Register.ENDED] == 0
-        self._perceived = perceived_so_far(self._table)
-        self._relevant = digests_of(Relevance.of(program).of_rows(state.registers))
-        self._wins = wins_of(program)
+        self._rooms = many_rooms(program, rooms, seed)
+        self._drawn = ~self._rooms.ended
+        self._perceived = perceived_so_far(self._rooms.table)
+        self._relevant = digests_of(Relevance.of(program).of_rows(self._rooms.table.state.registers))
 
-    def followed(self, room: int, plan: Sequence[NDArray[np.int64]]) -> tuple[list[int], list[int]]:
+    def followed(self, room: int, plan: Plan) -> tuple[list[int], list[int]]:
         """The other rooms that look like a room for as long as a plan is followed that solves it.
 
         Rooms that begin alike in all that matters are left out.
@@ -153,23 +164,19 @@ class Lookalikes:
         others = np.flatnonzero(same & self._drawn)
         if not len(others):
             return [], []
-        table, state = self._table, self._table.state
-        state.registers[:], state.boards[:], state.keys[:] = self._registers, self._boards, self._keys
-        state.registers[:, Register.ENDED] = 1
-        state.registers[[room, *others], Register.ENDED] = 0
+        table = self._rooms.table
+        self._rooms.restart([room, *others.tolist()])
         solved: list[int] = []
         failed: list[int] = []
         for action in plan:
-            table.batch.ports.actions[:] = action
-            advance(table)
-            registers = state.registers[others]
-            over = (registers[:, Register.ENDED] != 0) | (state.registers[room, Register.ENDED] != 0)
-            won = (registers[:, Register.ENDED] != 0) & self._wins[registers[:, Register.OUTCOME]]
+            self._rooms.do(action)
+            ended, won = self._rooms.ended, self._rooms.won[others]
+            over = ended[others] | ended[room]
             solved += others[over & won].tolist()
             failed += others[over & ~won].tolist()
             perceived = perceived_so_far(table)
             told_apart = perceived[others] != perceived[room]
-            state.registers[others[told_apart], Register.ENDED] = 1
+            table.state.registers[others[told_apart], Register.ENDED] = 1
             others = others[~over & ~told_apart]
             if not len(others):
                 break
@@ -177,4 +184,4 @@ class Lookalikes:
 
     def start(self, room: int) -> Start:
         """How a room begins."""
-        return Start(self._registers[room], self._boards[room], self._keys[room])
+        return self._rooms.start(room)

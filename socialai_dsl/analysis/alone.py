@@ -25,14 +25,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.redrawn import redrawn, sites_of
+from socialai_dsl.analysis.redrawn import redrawn, redrawn_each, sites_of
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import wins_of
+from socialai_dsl.analysis.rooms import DrawnRooms, Plan
 from socialai_dsl.analysis.search import Search, SearchVerdict
 from socialai_dsl.envs.table import Start, Table
-from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
+from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program
 
 LEARNT_FROM: Final = 32
 """The most twins of a room that choose its policy; at most a quarter of them do."""
@@ -116,15 +115,6 @@ def _share(found: Sequence[NDArray[np.bool_]], learnt: int) -> float:
     return float(max(found, key=lambda wins: int(wins[:learnt].sum()))[learnt:].mean())
 
 
-@dataclass(frozen=True)
-class _Twin:
-    """How a twin begins, and which row of which table plays it."""
-
-    table: int
-    row: int
-    start: Start
-
-
 class _Twins:
     """The twins of one room after the other. Each is played by a copy of the program with other draws."""
 
@@ -132,57 +122,50 @@ class _Twins:
         self._program, self._seed = program, seed
         canvas = program.header(Header.CANVAS_WIDTH) * program.header(Header.CANVAS_HEIGHT)
         self._cells = slice(0, canvas)
-        self._wins = wins_of(program)
         showing = self._showing()
         self._hidden = {site for site, shows in zip(sites_of(program), showing, strict=True) if not shows}
-        self._tables: list[Table] = []
-        self._drawn: list[_Twin] = []
+        self._blocks: list[DrawnRooms] = []
+        self._twins: list[tuple[int, int]] = []  # block, row
 
     def __len__(self) -> int:
-        return len(self._drawn)
+        return len(self._twins)
 
     def draw(self, room: int, wanted: int) -> int:
         """Draw twins of a room until enough look like it, itself among them; the number found."""
-        self._drawn, looks = [], None
+        self._twins, looks = [], None
         for number in range(_BLOCKS):
-            table = self._table(number)
-            begin(table, self._seed, {"index": np.full(table.rows, room)})
-            looks_here = self._looks(table)
+            block = self._block(number)
+            block.draw(self._seed, room)
+            looks_here = self._looks(block.table)
             looks = looks_here[0] if looks is None else looks
-            self._drawn += [
-                _Twin(number, k, table.start(k))
-                for k in np.flatnonzero((looks_here == looks).all(axis=1)).tolist()
-            ]
-            if len(self._drawn) >= wanted:
+            alike = np.flatnonzero((looks_here == looks).all(axis=1))
+            self._twins += [(number, row) for row in alike.tolist()]
+            if len(self._twins) >= wanted:
                 break
-        del self._drawn[wanted:]
-        return len(self._drawn)
+        del self._twins[wanted:]
+        return len(self._twins)
 
     def start_of(self, twin: int) -> Start:
         """How a twin begins."""
-        return self._drawn[twin].start
+        block, row = self._twins[twin]
+        return self._blocks[block].start(row)
 
-    def play(self, plan: tuple[NDArray[np.int64], ...]) -> NDArray[np.bool_]:
+    def play(self, plan: Plan) -> NDArray[np.bool_]:
         """Do the same in all twins; which of them succeed, (K,)."""
-        for twin in self._drawn:
-            state = self._tables[twin.table].state
-            state.registers[twin.row], state.boards[twin.row], state.keys[twin.row] = twin.start
-        for number in sorted({twin.table for twin in self._drawn}):
-            table = self._tables[number]
-            for action in plan:
-                table.batch.ports.actions[:] = action
-                advance(table)
-        ends = np.stack([self._tables[twin.table].state.registers[twin.row] for twin in self._drawn])
-        solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
-        return solved
+        solved = []
+        for number in sorted({block for block, _ in self._twins}):
+            rows, block = [row for own, row in self._twins if own == number], self._blocks[number]
+            block.restart(rows)
+            block.play(plan)
+            solved.append(block.won[rows])
+        return np.concatenate(solved)
 
-    def _table(self, number: int) -> Table:
-        """The table of a block; the first row of the first block plays the program as it is."""
-        if number == len(self._tables):
-            first = number * _BLOCK
-            copies = [redrawn(self._program, self._hidden, first + k) for k in range(_BLOCK)]
-            self._tables.append(Table(copies, _BLOCK))
-        return self._tables[number]
+    def _block(self, number: int) -> DrawnRooms:
+        """The rooms of a block; the first row of the first block plays the program as it is."""
+        if number == len(self._blocks):
+            salts = range(number * _BLOCK, (number + 1) * _BLOCK)
+            self._blocks.append(DrawnRooms([redrawn(self._program, self._hidden, salt) for salt in salts]))
+        return self._blocks[number]
 
     def _looks(self, table: Table) -> NDArray[np.int64]:
         """What a room looks like to whoever sees no NPC, (rows, cells + 3): its cells, and where the agent stands."""
@@ -193,13 +176,12 @@ class _Twins:
     def _showing(self) -> NDArray[np.bool_]:
         """Which sites show whenever they change anything, (sites,)."""
         sites = self._program.header(Header.SITES)
-        copies = [self._program, *(redrawn(self._program, [one], 1) for one in sites_of(self._program))]
-        table = Table(copies, len(copies))
+        drawn = DrawnRooms([self._program, *redrawn_each(self._program, sites_of(self._program), 1)])
         relevant = Relevance.of(self._program).registers
         shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
         for room in range(_ROOMS_PER_SITE):
-            begin(table, self._seed, {"index": np.full(len(copies), room)})
-            looks, registers = self._looks(table), table.state.registers[:, relevant]
+            drawn.draw(self._seed, room)
+            looks, registers = self._looks(drawn.table), drawn.table.state.registers[:, relevant]
             seen = (looks[1:] != looks[0]).any(axis=1)
             shows |= seen
             hides |= (registers[1:] != registers[0]).any(axis=1) & ~seen

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -10,32 +9,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.advance import advance, begin, compiled
+from socialai_dsl.analysis.advance import compiled
 from socialai_dsl.analysis.effort import Effort, OutOfTimeError, keep_time
+from socialai_dsl.analysis.rooms import DrawnRooms, random_actions
 from socialai_dsl.analysis.search import Search, SearchVerdict
-from socialai_dsl.analysis.twins import random_actions
+from socialai_dsl.analysis.tally import Part, parts_of
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.table import Table
-from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario
-from socialai_dsl.source import Span
+from socialai_dsl.program import Program
 
 _STEPS: Final = 200
 """How long rooms are played with random actions."""
-
-
-@dataclass(frozen=True)
-class CoverageItem:
-    """A state, a rule or an outcome.
-
-    Attributes:
-        kind: which of them. name: its address, such as `wizard.courtesy.stranger`. span: where it is written.
-    """
-
-    kind: str
-    name: str
-    span: Span
 
 
 @dataclass
@@ -48,7 +32,7 @@ class Coverage:
     """
 
     parts: int
-    missing: tuple[CoverageItem, ...]
+    missing: tuple[Part, ...]
     proven: bool
 
 
@@ -57,7 +41,7 @@ class _Seen:
     """What has happened so far."""
 
     program: Program
-    names: set[str] = field(default_factory=set)
+    counted: set[tuple[str, str]] = field(default_factory=set)
     states: dict[str, set[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,8 +56,8 @@ class _Seen:
 
     def count(self, counters: dict[str, Any]) -> None:
         """Note which rules fired and how episodes ended."""
-        for kind in ("rules", "outcomes"):
-            self.names |= {f"{kind} {name}" for name, times in counters[kind].items() if times}
+        for counter in ("rules", "outcomes"):
+            self.counted |= {(counter, name) for name, times in counters[counter].items() if times}
 
 
 def coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None = None) -> Coverage:
@@ -93,7 +77,7 @@ def coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | 
 
 def _coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None) -> Coverage:
     program = compiled(loaded)
-    parts, seen = list(_parts(loaded.checked)), _Seen(program)
+    parts, seen = list(parts_of(loaded.checked)), _Seen(program)
     _play_at_random(program, seen, effort)
     if scripted is not None:
         _play_script(compiled(scripted), seen, effort)
@@ -101,48 +85,26 @@ def _coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario |
     with suppress(OutOfTimeError):
         proven = bool(_missing(parts, seen)) and _search(program, parts, seen, effort)
     missing = _missing(parts, seen)
-    return Coverage(len({part.span for _, part in parts}), tuple(missing), proven)
+    return Coverage(len({part.span for part in parts}), tuple(missing), proven)
 
 
-_Key = tuple[str, int] | str
-"""What tells that a part has happened: a register of a frame with the number of the state, or a counter."""
-
-
-def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, CoverageItem]]:
-    for frame in checked.frames:
-        for number, step in enumerate(frame.steps):
-            if step.duration == 0:  # it is left out
-                continue
-            in_a_row = frame.in_a_row or step.duration == FOR_EVER
-            key: _Key = (f"{frame.member}.frame", number) if in_a_row else f"rules {step.name}"
-            yield key, CoverageItem("step", step.name, step.span)
-        for number, state in enumerate(frame.states):
-            name = f"{frame.member}.{frame.frame}.{state.name}"
-            yield (f"{frame.member}.frame", number), CoverageItem("state", name, state.span)
-    for rule in (*(rule for frame in checked.frames for rule in frame.rules), *checked.rules):
-        yield f"rules {rule.name}", CoverageItem("rule", rule.name, rule.span)
-    for outcome in checked.outcomes:
-        yield f"outcomes {outcome.name}", CoverageItem("outcome", outcome.name, outcome.condition.span)
-
-
-def _missing(parts: list[tuple[_Key, CoverageItem]], seen: _Seen) -> list[CoverageItem]:
+def _missing(parts: list[Part], seen: _Seen) -> list[Part]:
     """What has not happened; what several members have in common has happened if it did with one of them."""
-    happened = {part.span for key, part in parts if _has_happened(key, part, seen)}
-    missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
+    happened = {part.span for part in parts if _has_happened(part, seen)}
+    missing = {part.span: part for part in reversed(parts) if part.span not in happened}
     return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
 
 
-def _has_happened(key: _Key, part: CoverageItem, seen: _Seen) -> bool:
-    if isinstance(key, str):
-        return key in seen.names
-    states = seen.states.get(key[0], set())
+def _has_happened(part: Part, seen: _Seen) -> bool:
+    if part.number is None:
+        return ("outcomes" if part.kind == "outcome" else "rules", part.address) in seen.counted
+    states = seen.states.get(part.frame, set())
     # Entries of `steps` follow each other, and one that ends in the turn in which it begins is not seen in between.
-    return max(states, default=-1) >= key[1] if part.kind == "step" else key[1] in states
+    return max(states, default=-1) >= part.number if part.kind == "step" else part.number in states
 
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
-    table = Table([program], effort.rooms)
-    begin(table, effort.seed, None)
+    table = DrawnRooms.numbered(program, effort.rooms, effort.seed).table
     seen.watch(table.state.registers)
     choose = random_actions(program, effort.rooms, effort.seed)
     for step in range(_STEPS):
@@ -155,23 +117,21 @@ def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
 
 def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
     """Members and their states have the same names and numbers with a frame for the agent."""
-    table, watching = Table([program], effort.rooms), _Seen(program, seen.names, seen.states)
-    begin(table, effort.seed, None)
-    while not table.state.registers[:, Register.ENDED].all():
-        table.batch.ports.actions[:] = table.scripted_actions()
-        advance(table)
-        watching.watch(table.state.registers)
-    watching.count(table.counters())
+    drawn = DrawnRooms.numbered(program, effort.rooms, effort.seed)
+    watching = _Seen(program, seen.counted, seen.states)
+    while not drawn.ended.all():
+        drawn.do(drawn.table.scripted_actions())
+        watching.watch(drawn.table.state.registers)
+    watching.count(drawn.table.counters())
 
 
-def _search(program: Program, parts: list[tuple[_Key, CoverageItem]], seen: _Seen, effort: Effort) -> bool:
+def _search(program: Program, parts: list[Part], seen: _Seen, effort: Effort) -> bool:
     """Go through all that can be done in room after room; whether nothing was left out."""
-    table = Table([program], effort.rooms)
-    begin(table, effort.seed, None)
+    drawn = DrawnRooms.numbered(program, effort.rooms, effort.seed)
     search = Search(program, (), seen.watch)
 
-    def find(row: int) -> bool:
-        finding = search.solve(*table.start(row), effort.states, effort.clock)
+    def find(room: int) -> bool:
+        finding = search.solve(*drawn.start(room), effort.states, effort.clock)
         seen.count(search.counters())
         return finding.verdict is SearchVerdict.UNSOLVABLE and finding.exact
 

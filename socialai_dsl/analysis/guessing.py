@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from socialai_dsl.analysis.advance import advance, begin
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import wins_of
+from socialai_dsl.analysis.rooms import Plan, wins_of
 from socialai_dsl.analysis.search import (
     Chances,
     RandomActions,
@@ -43,10 +43,6 @@ _LOOKED_INTO: Final = 6
 _FEW_STATES: Final = 2_000
 """The number of sequences, among those that tell rooms apart, after which a solution is searched, and the number of
 states of each search."""
-
-
-Plan = Sequence[NDArray[np.int64]]
-"""Actions, int64 (3 + slots,) each, one after the other."""
 
 
 class GuessingVerdict(Enum):

@@ -20,18 +20,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.advance import advance, begin
-from socialai_dsl.analysis.alike import Lookalikes
+from socialai_dsl.analysis.alike import Lookalikes, like_first
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict, Plan
-from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
+from socialai_dsl.analysis.facts import RoomFacts
+from socialai_dsl.analysis.guessing import Guessing, GuessingVerdict
+from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn_each
 from socialai_dsl.analysis.relevance import Relevance
-from socialai_dsl.analysis.rooms import Rooms, wins_of
+from socialai_dsl.analysis.rooms import DrawnRooms, Plan
 from socialai_dsl.analysis.search import Search, SearchVerdict, marks
-from socialai_dsl.analysis.twins import like_first
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.table import Start, Table
-from socialai_dsl.program import Program, Register
+from socialai_dsl.envs.table import Start
+from socialai_dsl.program import Program
 
 CHANCE: Final = "chance during the episode"
 TOGETHER: Final = "a combination of draws"
@@ -92,28 +91,25 @@ class Knowing:
     """Looks at rooms one after the other.
 
     Args:
-        rooms: the rooms.
+        rooms: the rooms, with what is known of them.
         effort: how much is tried.
         scripted: the program of the same scenario with a frame for the agent, if there is one.
     """
 
-    def __init__(self, rooms: Rooms, effort: Effort, scripted: Program | None = None) -> None:
+    def __init__(self, rooms: RoomFacts, effort: Effort, scripted: Program | None = None) -> None:
         self._rooms, self._effort = rooms, effort
         program = rooms.program
         named = [(site, name) for site, name in names_of_sites(rooms.checked, program).items() if name]
         self._drawn = [name for _, name in named for _ in range(_COPIES)]
-        copies = [redrawn(program, [site], salt) for site, _ in named for salt in range(1, _COPIES + 1)]
-        self._table = Table([program, *copies], 1 + len(copies))
+        sites = [site for site, _ in named]
+        self._redrawn = DrawnRooms([program, *redrawn_each(program, sites, _COPIES)])
         self._relevance = Relevance.of(program)
         self._chances = marks(1 + _COPIES)[1:] if self._relevance.chance else marks(1)[1:]
-        sites = [site for site, _ in named]
         self._script = None if scripted is None else _Script(scripted, sites, self._chances, effort)
-        self._playing = Table([program], max(1, len(copies) + len(self._chances)))
-        begin(self._playing, 0, None)
+        self._playing = DrawnRooms.numbered(program, max(1, len(self._drawn) + len(self._chances)), 0)
         self._search = Search(program)
         self._pair = Guessing(program, np.ones(2, np.int64))
         self._lookalikes = Lookalikes(program, effort.rooms, effort.seed)
-        self._wins = wins_of(program)
 
     def look_at(self, room: int) -> RoomKnown:
         """What an agent can know in a room."""
@@ -172,16 +168,17 @@ class Knowing:
 
     def _others(self, room: int) -> list[_Other]:
         """The alternatives of a room that begin otherwise and look the same."""
-        begin(self._table, self._effort.seed, {"index": np.full(self._table.rows, room)})
-        state = self._table.state
-        relevant = self._relevance.of_rows(state.registers[:, : self._rooms.start(room)[0].shape[0]])
+        drawn, table = self._redrawn, self._redrawn.table
+        drawn.draw(self._effort.seed, room)
+        width = len(self._rooms.start(room).registers)
+        relevant = self._relevance.of_rows(table.state.registers[:, :width])
         different = (relevant != relevant[0]).any(axis=1)
         others = [
-            _Other(row, self._drawn[row - 1], self._table.start(row))
-            for row in np.flatnonzero(like_first(self._table) & different).tolist()
+            _Other(row, self._drawn[row - 1], drawn.start(row))
+            for row in np.flatnonzero(like_first(table)[0] & different).tolist()
         ]
         registers, board, key = self._rooms.start(room)
-        for row, mark in enumerate(self._chances.tolist(), self._table.rows):
+        for row, mark in enumerate(self._chances.tolist(), table.rows):
             other = key.copy()
             other[Key.KEY] ^= np.uint64(mark)
             others.append(_Other(row, CHANCE, Start(registers, board, other)))
@@ -189,19 +186,9 @@ class Knowing:
 
     def _solved(self, others: Sequence[_Other], plan: Plan) -> NDArray[np.bool_]:
         """In which alternatives a plan succeeds as well."""
-        state, count = self._playing.state, len(others)
-        state.registers[:, Register.ENDED] = 1
-        for row, other in enumerate(others):
-            registers, board, key = other.start
-            state.registers[row] = registers[: state.registers.shape[1]]
-            state.boards[row] = board[: state.boards.shape[1]]
-            state.keys[row] = self._playing.own_keys(key)
-        for action in plan:
-            self._playing.batch.ports.actions[:] = action
-            advance(self._playing)
-        ends = state.registers[:count]
-        solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
-        return solved
+        self._playing.put([other.start for other in others])
+        self._playing.play(plan)
+        return self._playing.won[: len(others)]
 
     def _both(self, room: int, other: _Other) -> Start:
         """The room and an alternative: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
@@ -228,25 +215,24 @@ class ScriptRun:
     known: Mapping[int, int]
 
 
-def followed(table: Table, program: Program) -> ScriptRun:
-    """Let the script of a program play a room, in row 0 of a table that was just reset, and alternatives beside it."""
-    state, step = table.state, 0
+def followed(drawn: DrawnRooms) -> ScriptRun:
+    """Let the script play a room that was just drawn in row 0, and alternatives in the rows beside it."""
+    table, step = drawn.table, 0
     looks, acts = np.full(table.rows, -1), np.full(table.rows, -1)
     plan: list[NDArray[np.int64]] = []
     while True:
-        differs = state.registers[:, Register.ENDED] != state.registers[0, Register.ENDED]
-        differs |= ~like_first(table)
+        ended = drawn.ended
+        differs = (ended != ended[0]) | ~like_first(table)[0]
         looks[differs & (looks < 0)] = step
-        if (state.registers[:, Register.ENDED] != 0).all():
+        if ended.all():
             break
         actions = table.scripted_actions()
         acts[(actions != actions[0]).any(axis=1) & (acts < 0)] = step
-        if not state.registers[0, Register.ENDED]:
+        if not ended[0]:
             plan.append(actions[0].copy())
-        table.batch.ports.actions[:] = actions
-        advance(table)
+        drawn.do(actions)
         step += 1
-    solved = wins_of(program)[state.registers[:, Register.OUTCOME]]
+    solved = drawn.won
     if not solved[0]:
         return ScriptRun(None, {})
     same = acts < 0
@@ -264,17 +250,15 @@ class _Script:
     def __init__(
         self, program: Program, sites: Sequence[Site], chances: NDArray[np.uint64], effort: Effort
     ) -> None:
-        copies = [redrawn(program, [site], salt) for site in sites for salt in range(1, _COPIES + 1)]
-        playables = [program, *copies, *[program] * len(chances)]
-        self._table = Table(playables, len(playables))
-        self._first_chance, self._chances = 1 + len(copies), chances
-        self._program, self._seed = program, effort.seed
+        self._drawn = DrawnRooms([program, *redrawn_each(program, sites, _COPIES), *[program] * len(chances)])
+        self._chances, self._seed = chances, effort.seed
 
     def play(self, room: int) -> ScriptRun:
         """Play the room and all alternatives to the end."""
-        begin(self._table, self._seed, {"index": np.full(self._table.rows, room)})
-        self._table.state.keys[self._first_chance :, Key.KEY] ^= self._chances
-        return followed(self._table, self._program)
+        self._drawn.draw(self._seed, room)
+        table = self._drawn.table
+        table.state.keys[table.rows - len(self._chances) :, Key.KEY] ^= self._chances
+        return followed(self._drawn)
 
 
 def _by_name(others: Sequence[_Other]) -> Iterator[tuple[str, list[_Other]]]:

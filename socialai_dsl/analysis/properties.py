@@ -15,10 +15,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.advance import advance, begin, compiled
+from socialai_dsl.analysis.advance import compiled
+from socialai_dsl.analysis.alike import like_first
 from socialai_dsl.analysis.effort import Effort, OutOfTimeError
-from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict, Plan
+from socialai_dsl.analysis.facts import RoomFacts
+from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict
 from socialai_dsl.analysis.knowable import TOGETHER, Knowability, Knowing, RoomKnown, followed
+from socialai_dsl.analysis.leaks import Script, Tellers, TwinComparison, Twins
 from socialai_dsl.analysis.muting import muted
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.reports import (
@@ -31,22 +34,12 @@ from socialai_dsl.analysis.reports import (
     rooms_text,
     steps_text,
 )
-from socialai_dsl.analysis.rooms import Rooms, name_of, wins_of
+from socialai_dsl.analysis.rooms import DrawnRooms, Plan, name_of, random_actions
 from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
-from socialai_dsl.analysis.twins import (
-    Script,
-    Tellers,
-    TwinComparison,
-    Twins,
-    layouts,
-    like_first,
-    random_actions,
-)
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.envs.table import Table
 from socialai_dsl.frontend import rival_of
-from socialai_dsl.program import Program, Register
+from socialai_dsl.program import Program
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.terms import Const, InState, SaidBy, walk
 from socialai_dsl.semantics.typed import typed
@@ -80,9 +73,9 @@ class Trial:
         self._rivals: dict[str, NDArray[np.bool_]] = {}
 
     @cached_property
-    def rooms(self) -> Rooms:
+    def rooms(self) -> RoomFacts:
         """The rooms, with what is known of each."""
-        return Rooms(self.loaded.checked, self.program, self.effort)
+        return RoomFacts(self.loaded.checked, self.program, self.effort)
 
     @cached_property
     def solved(self) -> NDArray[np.bool_]:
@@ -174,14 +167,13 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 def _acts(program: Program, effort: Effort, room: int, plan: Plan) -> tuple[str, ...]:
     """What a plan does in a room, as it is typed; nothing once the time is over."""
-    table = Table([program], 1)
+    drawn = DrawnRooms([program])
     found: list[str] = []
     with suppress(OutOfTimeError):
-        begin(table, effort.seed, {"index": room})
+        drawn.draw(effort.seed, room)
         for action in plan:
-            table.batch.ports.actions[:] = action
-            advance(table)
-            last = table.describe(0)["last"]
+            drawn.do(action)
+            last = drawn.table.describe(0)["last"]
             found.append(typed(last["action"], last["said"]))
     return tuple(found) if len(found) == len(plan) else ()
 
@@ -240,12 +232,11 @@ def search_rooms_of(
     program: Program, goals: Sequence[str] | None, effort: Effort, what: str
 ) -> Iterator[Finding]:
     """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
-    table = Table([program], effort.rooms)
-    begin(table, effort.seed, None)
+    drawn = DrawnRooms.numbered(program, effort.rooms, effort.seed)
     search = Search(program, goals)
 
-    def find(row: int) -> Finding:
-        return search.solve(*table.start(row), effort.states, effort.clock)
+    def find(room: int) -> Finding:
+        return search.solve(*drawn.start(room), effort.states, effort.clock)
 
     return effort.each_room(what, find, _is_decided)
 
@@ -323,13 +314,9 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
     """In which rooms of the effort the agent's own frame succeeds, (rooms,)."""
-    table = Table([program], effort.rooms)
-    begin(table, effort.seed, None)
-    registers = table.state.registers
-    while not registers[:, Register.ENDED].all():
-        table.batch.ports.actions[:] = table.scripted_actions()
-        advance(table)
-    return wins_of(program)[registers[:, Register.OUTCOME]]
+    drawn = DrawnRooms.numbered(program, effort.rooms, effort.seed)
+    drawn.play_scripts()
+    return drawn.won
 
 
 def _only_through(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
@@ -447,8 +434,7 @@ class _Needing:
         self._trial, self._plan, self._effort = trial, plan, effort
         silent = compiled(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
         self._search = Search(silent)
-        self._alone = Table([silent], effort.rooms)
-        begin(self._alone, effort.seed, None)
+        self._alone = DrawnRooms.numbered(silent, effort.rooms, effort.seed)
         self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
         self._with: dict[int, _Draw] = {}
         self._scripted: dict[int, _Draw | None] = {}
@@ -535,9 +521,8 @@ class _Draw:
 
     def __init__(self, program: Program, path: str, weighted: Sequence[int]) -> None:
         weights = Counter(weighted)
-        self._layouts = layouts(program, path, list(weights))
-        self._table = Table([program], len(weights))
-        self._program, self._weights = program, list(weights.values())
+        self._path, self._values, self._weights = path, list(weights), list(weights.values())
+        self._drawn, self._program = DrawnRooms([program], len(weights)), program
 
     @cached_property
     def _guessing(self) -> Guessing:
@@ -545,42 +530,40 @@ class _Draw:
 
     def is_told(self, room: int, effort: Effort) -> bool:
         """Whether the agent's own frame solves more than a guess, and does nothing that it could not know is right."""
-        for first in range(min(len(self._layouts), _TURNS)):
-            layouts = [*self._layouts[first:], *self._layouts[:first]]
+        for first in range(min(len(self._values), _TURNS)):
+            values = [*self._values[first:], *self._values[:first]]
             weights = [*self._weights[first:], *self._weights[:first]]
-            begin(self._table, effort.seed, {"index": room, "layout": layouts})
-            known = followed(self._table, self._program).known
+            self._drawn.draw_with(effort.seed, room, self._path, values)
+            known = followed(self._drawn).known
             if any(weights[0] + weights[row] > max(weights) for row in known):
                 return True
         return False
 
     def guess(self, room: int, effort: Effort) -> Guess:
         """How well a room can be solved, whatever its draw."""
-        begin(self._table, effort.seed, {"index": room, "layout": self._layouts})
-        state = self._table.state
-        if not like_first(self._table).all():
+        self._drawn.draw_with(effort.seed, room, self._path, self._values)
+        if not like_first(self._drawn.table).all():
             return Guess(GuessingVerdict.TELLS_APART, 0, True)
-        return self._guessing.solve(state.registers, state.boards, state.keys, effort)
+        return self._guessing.solve(*self._drawn.starts(slice(None)), effort)
 
     def told(self, room: int, effort: Effort, tellers: Tellers) -> str | None:
         """The first difference between the rooms of this draw, in words; None if none is found."""
-        begin(self._table, effort.seed, {"index": room, "layout": self._layouts})
-        state = self._table.state
+        drawn, table = self._drawn, self._drawn.table
+        drawn.draw_with(effort.seed, room, self._path, self._values)
         plan: Plan | None = ()
-        if like_first(self._table).all():
+        if like_first(table).all():
             few = replace(effort, states=_SEARCHED_STATES)
-            plan = self._guessing.first_difference(state.registers, state.boards, state.keys, few)
+            plan = self._guessing.first_difference(*drawn.starts(slice(None)), few)
         if plan is None:
             return None
-        before = state.registers.copy()
+        before = table.state.registers.copy()
         for action in plan:
-            before = state.registers.copy()
-            self._table.batch.ports.actions[:] = action
-            advance(self._table)
-        same = like_first(self._table)
+            before = table.state.registers.copy()
+            drawn.do(action)
+        same = like_first(table)[0]
         if same.all():
             return None
-        names = names_text(tellers.between(self._table, (0, int(same.argmin())), before))
+        names = names_text(tellers.between(table, (0, int(same.argmin())), before))
         return f"it is {names}, after {steps_text(len(plan))}"
 
 

@@ -35,6 +35,11 @@ def redrawn(program: Program, sites: Collection[Site], salt: int) -> Program:
     return other
 
 
+def redrawn_each(program: Program, sites: Collection[Site], copies: int) -> list[Program]:
+    """For each site as many programs that draw something else there, and nothing else."""
+    return [redrawn(program, [site], salt) for site in sites for salt in range(1, copies + 1)]
+
+
 def sites_of(program: Program) -> list[Site]:
     """The sites of a program."""
     return [(number, member) for number, member in program.table(Header.SITE_AT).tolist()]

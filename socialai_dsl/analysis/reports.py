@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
-from socialai_dsl.analysis.twins import SOMEBODY
+from socialai_dsl.analysis.leaks import SOMEBODY
 
 SHOWN: Final = 5
 """How many rooms a report names at most."""

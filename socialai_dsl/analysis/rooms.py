@@ -1,80 +1,139 @@
-"""Drawn rooms with known facts: members that are absent, and whether a success exists."""
+"""Rooms as a seed draws them, one in each row of a table, drawn again and played side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from socialai_dsl.analysis.advance import advance, begin
-from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
+from socialai_dsl.analysis.advance import advance, begin, begin_those_possible
 from socialai_dsl.envs.table import Start, Table
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
-from socialai_dsl.semantics.free_cells import asks_about_cells
-from socialai_dsl.semantics.plans import CheckedScenario, Placing
+from socialai_dsl.envs.values import shown
+from socialai_dsl.program import Header, Program, Register
+from socialai_dsl.semantics.plans import CheckedScenario
+
+Plan = Sequence[NDArray[np.int64]]
+"""Actions, int64 (3 + slots,) each, one after the other."""
 
 
-class Rooms:
-    """Rooms 0, 1, ... of a seed, with a cache of the facts found about each.
+class DrawnRooms:
+    """Rooms in the rows of a table, and how each of them began.
 
     Args:
-        checked: the scenario. program: of the same.
-        effort: which rooms, and how many states of each are searched.
+        programs: row i plays `programs[i modulo their number]`, all of them with the outcomes of the first.
+        rows: how many rooms there are; None: one for each program.
+
+    Attributes:
+        table: the rows.
     """
 
-    def __init__(self, checked: CheckedScenario, program: Program, effort: Effort) -> None:
-        self.checked, self.program = checked, program
-        self._effort = effort
-        self._table = Table([program], effort.rooms)
-        begin(self._table, effort.seed, None)
-        state = self._table.state
-        self._registers, self._boards = state.registers.copy(), state.boards.copy()
-        self._keys = state.keys.copy()
-        self._search = Search(program)
-        self._findings: dict[int, Finding] = {}
+    def __init__(self, programs: Sequence[Program], rows: int | None = None) -> None:
+        self.table = Table(programs, len(programs) if rows is None else rows)
+        self._program, self._wins = programs[0], wins_of(programs[0])
 
-    def start(self, room: int) -> Start:
-        """How a room begins."""
-        return Start(self._registers[room], self._boards[room], self._keys[room])
+    @classmethod
+    def numbered(cls, program: Program, rooms: int, seed: int, all_possible: bool = True) -> Self:
+        """Rooms 0 to rooms - 1 of a seed. Unless all are possible, those that cannot be drawn have ended."""
+        drawn = cls([program], rooms)
+        if all_possible:
+            drawn.draw(seed)
+        else:
+            begin_those_possible(drawn.table, seed)
+            drawn._keep_starts()
+        return drawn
 
-    def success(self, room: int, effort: Effort) -> Finding:
-        """A shortest success in a room, with luck."""
-        found = self._findings.get(room)
-        if found is None or (found.verdict is SearchVerdict.UNDECIDED and not effort.clock.is_over):
-            found = self._search.solve(*self.start(room), effort.states, effort.clock)
-            self._findings[room] = found
-        return found
+    # -- drawing --
 
-    def missing(self, room: int, names: Collection[str]) -> list[str]:
-        """Those of these members that are absent from a room although they were placed."""
-        return [name for name in self._unasked if name in names and self._gone(room, self._unasked[name])]
+    def draw(self, seed: int, index: ArrayLike | None = None, layouts: Any = None) -> None:
+        """Draw a room in every row.
 
-    @cached_property
-    def _unasked(self) -> dict[str, int]:
-        """What was not asked to be out of the room: name -> number of the entity."""
-        asked = {
-            item.entity
-            for item in self.checked.setup
-            if isinstance(item, Placing)
-            and (item.nowhere or item.inside is not None or not asks_about_cells(item))
-        }
-        numbers = range(len(self.checked.entities))
-        return {name_of(self.checked, number): number for number in numbers if number not in asked}
+        Args:
+            seed: of all rooms.
+            index: the number of the room, for all rows or for each, int (rows,); None: 0, 1, ...
+            layouts: what is given of the room, for each row.
+        """
+        given = {"index": index} if layouts is None else {"index": index, "layout": layouts}
+        begin(self.table, seed, None if index is None else given)
+        self._keep_starts()
 
-    def _gone(self, room: int, number: int) -> bool:
-        return bool(self._registers[room, FIRST_ENTITY + ENTITY_FIELDS * number + Field.GONE])
+    def draw_with(self, seed: int, index: ArrayLike, path: str, values: Sequence[int]) -> None:
+        """Draw a room in every row with a given value of one draw; everything else is as it is drawn.
 
-    @cached_property
-    def solved_by_idling(self) -> NDArray[np.bool_]:
-        """In which rooms a success comes of itself, while the agent does nothing, (rooms,)."""
-        registers = self._table.state.registers
-        while not registers[:, Register.ENDED].all():
-            self._table.batch.ports.actions[:] = idle(self.program)
-            advance(self._table)
-        return wins_of(self.program)[registers[:, Register.OUTCOME]]
+        Args:
+            seed: of all rooms.
+            index: the number of the room, for all rows or for each, int (rows,).
+            path: of the draw, such as `let.exit`.
+            values: for each row.
+        """
+        key = path.removeprefix("let.")
+        self.draw(seed, index, [{"let": {key: one}} for one in self.named(path, values)])
+
+    def named(self, path: str, values: Sequence[int]) -> list[Any]:
+        """Values of a draw, `let.exit`, by the names they have in a layout."""
+        name = next(register for register in self._program.registers if register.path == path)
+        return [shown(self._program, name, value) for value in values]
+
+    def _keep_starts(self) -> None:
+        state = self.table.state
+        self._starts = Start(state.registers.copy(), state.boards.copy(), state.keys.copy())
+
+    # -- starts --
+
+    def start(self, row: int) -> Start:
+        """How a room began."""
+        registers, boards, keys = self._starts
+        return Start(registers[row], boards[row], keys[row])
+
+    def starts(self, rows: slice | list[int]) -> Start:
+        """How several rooms began: registers (rooms, R), boards (rooms, C), keys (rooms, Key.WORDS)."""
+        registers, boards, keys = self._starts
+        return Start(registers[rows], boards[rows], keys[rows])
+
+    def restart(self, rows: list[int]) -> None:
+        """Let these rows be where they began; all others have ended."""
+        state = self.table.state
+        state.registers[:, Register.ENDED] = 1
+        registers, boards, keys = self.starts(rows)
+        state.registers[rows], state.boards[rows], state.keys[rows] = registers, boards, keys
+
+    def put(self, starts: Sequence[Start]) -> None:
+        """Let the first rows be where rooms of this program began in other tables; all others have ended."""
+        state = self.table.state
+        state.registers[:, Register.ENDED] = 1
+        for row, (registers, board, key) in enumerate(starts):
+            state.registers[row] = registers[: state.registers.shape[1]]
+            state.boards[row] = board[: state.boards.shape[1]]
+            state.keys[row] = self.table.own_keys(key)
+
+    # -- playing --
+
+    def do(self, actions: NDArray[np.int64]) -> None:
+        """Do an action, int64 (3 + slots,), or one in each row, (rows, 3 + slots), where episodes go on."""
+        self.table.batch.ports.actions[:] = actions
+        advance(self.table)
+
+    def play(self, plan: Plan) -> None:
+        """Do the actions of a plan in all rows, one after the other, where episodes go on."""
+        for action in plan:
+            self.do(action)
+
+    def play_scripts(self) -> None:
+        """Let the agents' own frames play all rows to the end."""
+        while not self.ended.all():
+            self.do(self.table.scripted_actions())
+
+    @property
+    def ended(self) -> NDArray[np.bool_]:
+        """Which rooms have ended, (rows,)."""
+        ended: NDArray[np.bool_] = self.table.state.registers[:, Register.ENDED] != 0
+        return ended
+
+    @property
+    def won(self) -> NDArray[np.bool_]:
+        """Which rooms have ended with a success, (rows,)."""
+        return self.ended & self._wins[self.table.state.registers[:, Register.OUTCOME]]
 
 
 def name_of(checked: CheckedScenario, number: int) -> str:
@@ -91,3 +150,15 @@ def idle(program: Program) -> NDArray[np.int64]:
 def wins_of(program: Program) -> NDArray[np.bool_]:
     """Which outcomes are successes, (outcomes + 1,); the last stands for none so far."""
     return np.array([outcome.success for outcome in program.outcome_table] + [False])
+
+
+Actions = Callable[[int], NDArray[np.int64]]
+"""What is done in each room in step t, int64 (rooms, 3 + slots)."""
+
+
+def random_actions(program: Program, rooms: int, seed: int) -> Actions:
+    """Any body action, and half of the time any utterance."""
+    generator = np.random.default_rng(seed)
+    sizes = [len(slot.words) for slot in program.sentences.slots]
+    highest = np.array([program.header(Header.PRIMITIVES) + 1, 2, program.header(Header.TEMPLATES), *sizes])
+    return lambda step: generator.integers(0, highest, (rooms, len(highest)))

@@ -84,7 +84,7 @@ class ScenarioReport:
             return
         never = _never(self.coverage, rooms_text(self.rooms))
         for part in self.coverage.missing:
-            message = f"the {part.kind} `{part.name}` {never}"
+            message = f"the {part.kind} `{part.address}` {never}"
             yield Diagnostic("W802", message, part.span, Severity.WARNING)
 
     @property
@@ -169,7 +169,7 @@ class ScenarioReport:
                 for plan, report in self.tried
             ],
             "never_happens": [
-                {"kind": part.kind, "name": part.name, **_place_as_object(part.span)} for part in missing
+                {"kind": part.kind, "name": part.address, **_place_as_object(part.span)} for part in missing
             ],
             "interrupted": self.interrupted,
             "success": None if self.depth is None else asdict(self.depth),
@@ -182,7 +182,7 @@ def _coverage(found: Coverage, told: Container[Span]) -> Iterator[str]:
     for part in found.missing:
         if part.span in told:
             never = _never(found, "these rooms")
-            yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` {never}"
+            yield f"  {_place(part.span)}: warning: the {part.kind} `{part.address}` {never}"
 
 
 def _never(found: Coverage, rooms: str) -> str:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +17,28 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.program import FrameColumn, Header, Program
-from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
+from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario, FramePlan, RulePlan
 from socialai_dsl.source import Span
 
 
 @dataclass(frozen=True, order=True)
-class TallyItem:
-    """A rule, state, step or outcome by where it is written; members that share a frame share its parts."""
+class Part:
+    """A rule, state, step or outcome by where it is written; members that share a frame share its parts.
+
+    Attributes:
+        span: where it is written. kind: which of them it is.
+        name: in its frame: `courtesy.stranger`.
+        address: with the member in front: `wizard.courtesy.stranger`.
+        frame: path of the register with the state of the member's frame; empty without one.
+        number: of a state or step in that register; None for what the engine counts.
+    """
 
     span: Span
     kind: str
     name: str
+    address: str = field(default="", compare=False)
+    frame: str = field(default="", compare=False)
+    number: int | None = field(default=None, compare=False)
 
 
 @dataclass
@@ -41,12 +51,12 @@ class Tally:
         episodes: how many were played to their end.
     """
 
-    times: Counter[TallyItem]
+    times: Counter[Part]
     endings: Counter[str]
     episodes: int
 
 
-def parts_of(checked: CheckedScenario) -> Iterator[TallyItem]:
+def parts_of(checked: CheckedScenario) -> Iterator[Part]:
     """Everything in a scenario that can come about."""
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
@@ -58,23 +68,27 @@ def parts_of(checked: CheckedScenario) -> Iterator[TallyItem]:
     yield from _of_the_world(checked)
 
 
-def _of_the_world(checked: CheckedScenario) -> Iterator[TallyItem]:
-    yield from (TallyItem(rule.span, "rule", rule.name) for rule in checked.rules)
-    yield from (TallyItem(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
+def _of_the_world(checked: CheckedScenario) -> Iterator[Part]:
+    yield from (Part(rule.span, "rule", rule.name, rule.name) for rule in checked.rules)
+    for outcome in checked.outcomes:
+        yield Part(outcome.condition.span, "outcome", outcome.name, outcome.name)
 
 
-def _step(frame: FramePlan, number: int) -> TallyItem:
+def _step(frame: FramePlan, number: int) -> Part:
     step = frame.steps[number]
-    return TallyItem(step.span, "step", f"{frame.frame}.{step.state or f'steps[{number}]'}")
+    name = f"{frame.frame}.{step.state or f'steps[{number}]'}"
+    seen = number if frame.in_a_row or step.duration == FOR_EVER else None
+    return Part(step.span, "step", name, step.name, f"{frame.member}.frame", seen)
 
 
-def _state(frame: FramePlan, number: int) -> TallyItem:
+def _state(frame: FramePlan, number: int) -> Part:
     state = frame.states[number]
-    return TallyItem(state.span, "state", f"{frame.frame}.{state.name}")
+    name = f"{frame.frame}.{state.name}"
+    return Part(state.span, "state", name, f"{frame.member}.{name}", f"{frame.member}.frame", number)
 
 
-def _rule(frame: FramePlan, rule: Any) -> TallyItem:
-    return TallyItem(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."))
+def _rule(frame: FramePlan, rule: RulePlan) -> Part:
+    return Part(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."), rule.name)
 
 
 class Watch:
@@ -121,7 +135,7 @@ class Watch:
 
     def tally(self, episodes: int) -> Tally:
         """The counts so far; `episodes` of them are over."""
-        times: Counter[TallyItem] = Counter()
+        times: Counter[Part] = Counter()
         endings: Counter[str] = Counter()
         counters = self._table.batch.counters
         for frames, first in zip(self._programs, self._table.batch.first_counters, strict=True):
@@ -160,9 +174,9 @@ class _Frames:
             for k in range(len(entered)):
                 entered[k] += np.count_nonzero((old != new) & (first <= k) & (k <= new))
 
-    def times(self, counters: list[int]) -> Counter[TallyItem]:
+    def times(self, counters: list[int]) -> Counter[Part]:
         """How often each part came about, by the engine's counters."""
-        times: Counter[TallyItem] = Counter()
+        times: Counter[Part] = Counter()
         numbers = count()
         for frame, entered in zip(self.checked.frames, self._entered, strict=True):
             for number in range(len(frame.steps)):

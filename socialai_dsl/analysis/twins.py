@@ -1,243 +1,223 @@
-"""Rooms that differ only in one draw: the first difference in sight or sound under equal actions, and its source."""
+"""Twins of drawn rooms: rooms in which one draw, and what follows from it, has another value that is possible."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, Final
 
-import numpy as np
-from numpy.typing import NDArray
+from socialai_dsl.analysis.rooms import DrawnRooms
+from socialai_dsl.program import Program
+from socialai_dsl.semantics.plans import CheckedScenario, Placing
+from socialai_dsl.semantics.terms import Quantification, walk
 
-from socialai_dsl.analysis.advance import advance, begin
-from socialai_dsl.analysis.rooms import name_of
-from socialai_dsl.envs.table import Start, Table, joined
-from socialai_dsl.envs.values import shown
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
-from socialai_dsl.semantics.plans import CheckedScenario, Entity
-from socialai_dsl.semantics.terms import Const, Read
+_HAPPENING: Final = ("t", "memory", "last", "heard", "pending")
+_ATTEMPTS: Final = 4
+"""How often a draw is repeated in search of another value."""
+_LATER: Final = "what is drawn during the episode"
 
-_PLACE: Final = (Field.X, Field.Y, Field.DIR)
-
-SOMEBODY: Final = "somebody's words"
-"""Tells where a line is heard whose speaker is not named."""
-
-
-class Tellers:
-    """Compares rooms of one program.
-
-    Args:
-        program: what is played. checked: of the same scenario.
-    """
-
-    def __init__(self, program: Program, checked: CheckedScenario) -> None:
-        self._program, self._checked = program, checked
-        self._before_npcs = bool(program.header(Header.FLAGS) & Flag.PICTURE_BEFORE_NPCS)
-
-    def between(self, table: Table, rows: tuple[int, int], before: NDArray[np.int32]) -> list[str]:
-        """Members, objects or `SOMEBODY` behind all that differs between two rows since the last step.
-
-        `before` holds the registers of all rows before it, int32 (E, R). It is empty where only the walls differ.
-        """
-        heard = [table.heard(row) for row in rows]
-        lines = set(heard[0]) ^ set(heard[1]) or {
-            line for said in heard if heard[0] != heard[1] for line in said
-        }
-        found = [name for line in sorted(lines) for row in rows for name in self._speakers(line, table, row)]
-        state, both = table.state, list(rows)
-        pictures = joined(state.image[both], state.extra[both], table.channels)
-        differs = (pictures[0] != pictures[1]).any(-1).ravel()  # (49,)
-        for row in rows:
-            found += self._seen(state.registers[row], before[row], differs)
-        return list(dict.fromkeys(found))
-
-    def _speakers(self, line: str, table: Table, row: int) -> Iterator[str]:
-        if not self._checked.names_shown:
-            yield SOMEBODY
-            return
-        registers = table.state.registers[row]
-        for entity in self._checked.entities:
-            called = self._called(entity, registers)
-            if (
-                called is not None
-                and line in table.heard(row)
-                and line.startswith((f"{called}: ", f"{called} to "))
-            ):
-                yield name_of(self._checked, entity.number)
-
-    def _called(self, entity: Entity, registers: NDArray[np.int32]) -> str | None:
-        match entity.name:
-            case Const(type=type_, value=value):
-                return type_.words[value - type_.low]
-            case Read(path=path):
-                name = next(register for register in self._program.registers if register.path == path)
-                return str(shown(self._program, name, int(registers[name.register])))
-        return None
-
-    def _seen(
-        self, registers: NDArray[np.int32], before: NDArray[np.int32], differs: NDArray[np.bool_]
-    ) -> Iterator[str]:
-        """Who and what is shown in the cells that differ; the picture was taken before members moved, or after."""
-        x, y, direction = (int(registers[FIRST_ENTITY + field]) for field in _PLACE)
-        ahead_x, ahead_y = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction]
-        for entity in self._checked.entities:
-            first = FIRST_ENTITY + ENTITY_FIELDS * entity.number
-            seen = before if self._before_npcs and entity.number else registers
-            dx, dy = int(seen[first + Field.X]) - x, int(seen[first + Field.Y]) - y
-            ahead, right = dx * ahead_x + dy * ahead_y, dy * ahead_x - dx * ahead_y
-            if seen[first + Field.GONE] == 0 and 0 <= ahead < VIEW and abs(right) <= VIEW // 2:
-                cell = (right + VIEW // 2) * VIEW + VIEW - 1 - ahead
-                if differs[cell]:
-                    yield name_of(self._checked, entity.number)
-
-
-# -- twins ---------------------------------------------------------------------------------------------------
-
-
-Actions = Callable[[int], NDArray[np.int64]]
-"""What is done in each pair of twins in step t, int64 (pairs, 3 + slots)."""
+Path = tuple[str | int, ...]
+"""Where a value stands in a layout: ("doors", 1, "color")."""
 
 
 @dataclass(frozen=True)
-class Leak:
-    """A pair of twins that could be told apart without a cue.
-
-    Attributes:
-        index: of the room. step: after which they differ; 0: from the start.
-        values: what was drawn in either. by: who or what differs, by name; empty where only the walls do.
-    """
+class Pair:
+    """A room and its twin: layouts of both, None for a room as it is drawn, and the number of the twin's draws."""
 
     index: int
-    step: int
-    values: tuple[Any, Any]
-    by: tuple[str, ...]
+    layout: dict[str, Any] | None
+    twin: dict[str, Any]
+    twin_index: int
+    draw: str
+    values: tuple[Any, ...]
 
 
-@dataclass(frozen=True)
-class TwinComparison:
-    """The result of playing pairs of twins.
+class _Part:
+    """What one draw decides of a room: some keys of one place in a layout.
 
     Attributes:
-        pairs: how many were played. cued: how many differ first in a cue. leaks: the pairs that differ otherwise.
-        rooms: the rooms of the pairs that differ.
+        name: of the draw, as an author would say it.
+        where: the place in a layout.
+        free: whether nothing limits it, so that any room's value does in any other.
     """
 
-    pairs: int
-    cued: int
-    leaks: tuple[Leak, ...]
-    rooms: tuple[int, ...]
+    def __init__(self, name: str, where: Path, keys: Sequence[str], free: bool = False) -> None:
+        self.name, self.where, self.free = name, where, free
+        self._keys = keys
+
+    def value(self, layout: Mapping[str, Any]) -> dict[str, Any]:
+        """Its keys and their values in a layout."""
+        inner = _at(layout, self.where)
+        return {key: inner[key] for key in self._keys if inner.get(key) is not None}
+
+    def without(self, layout: dict[str, Any]) -> dict[str, Any]:
+        """A copy of a layout that leaves it open."""
+        copied = deepcopy(layout)
+        inner = _at(copied, self.where)
+        for key in self._keys:
+            inner.pop(key, None)
+        return copied
+
+    def alone(self, value: Any, room: Mapping[str, Any]) -> dict[str, Any]:
+        """A layout that gives this value, and nothing else of a room."""
+        layout: Any = dict(value)
+        for key in reversed(self.where):
+            layout = [{}] * key + [layout] if isinstance(key, int) else {key: layout}
+        return layout  # type: ignore[no-any-return]
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it says where something is."""
+        return "at" in self._keys
 
 
-def layouts(program: Program, path: str, values: Sequence[int]) -> list[dict[str, Any]]:
-    """For each value of a draw (`let.exit`) the layout that gives it, and leaves everything else as it is drawn."""
-    name = next(register for register in program.registers if register.path == path)
-    key = path.removeprefix("let.")
-    return [{"let": {key: shown(program, name, value)}} for value in values]
+class _Move(_Part):
+    """One move of a sequence that was drawn, without its words, which are heard."""
+
+    def __init__(self, key: str, number: int) -> None:
+        super().__init__(f"let.{key}[{number}].move", ("let",), (key,), free=True)
+        self._key, self._number = key, number
+
+    def value(self, layout: Mapping[str, Any]) -> dict[str, Any]:
+        """The move in a layout."""
+        return {self._key: layout["let"][self._key][self._number][0]}
+
+    def alone(self, value: Any, room: Mapping[str, Any]) -> dict[str, Any]:
+        """A layout that gives the room's sequence with this move."""
+        acts = deepcopy(room["let"][self._key])
+        acts[self._number][0] = value[self._key]
+        return {"let": {self._key: acts}}
 
 
-class Twins:
-    """Pairs of rooms 0, 1, ... of a seed: rows 2k and 2k + 1 are room k, with two values of a draw.
+def _parts(layout: Mapping[str, Any]) -> list[_Part]:
+    """What is drawn of a room, or follows from what is drawn."""
+    parts = [_Part("room.size", ("room",), ("width", "height"), free=True)]
+    for key, value in layout.items():
+        if key in ("let", "state"):
+            names: dict[str, list[str]] = {}
+            for inner in value:
+                names.setdefault(inner.partition("[")[0], []).append(inner)
+            parts += [_Part(f"{key}.{name}", (key,), keys) for name, keys in names.items()]
+            parts += [
+                _Move(inner, k)
+                for inner, held in value.items()
+                if isinstance(held, list) and held and isinstance(held[0], list)
+                for k in range(len(held))
+            ]
+        elif key == "one_of":
+            parts += [_Part(f"cast.{name}.one_of", (key,), (name,), free=True) for name in value]
+        elif isinstance(value, dict) and "color" in value:
+            parts += _parts_of(key, (key,), value)
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            for k, one in enumerate(value):
+                parts += _parts_of(f"{key}[{k}]", (key, k), one)
+    return parts
 
-    Args:
-        program: what is played. checked: of the same scenario.
-        path: of the draw. values: for each room the two values, (rooms, 2).
-        by: members of the cast whose cues may differ.
+
+def _parts_of(name: str, where: Path, entity: Mapping[str, Any]) -> list[_Part]:
+    keys = [
+        ("place", ("at", "inside", "gone")),
+        ("color", ("color",)),
+        ("facing", ("facing",)),
+        ("name", ("name",)),
+    ]
+    if "clock" not in entity and "poked" not in entity:
+        keys.append(("state", ("state", "initial")))  # of an object
+    return [_Part(f"{name}.{said}", where, own) for said, own in keys if any(key in entity for key in own)]
+
+
+def pairs_of_rooms(program: Program, checked: CheckedScenario, rooms: int, seed: int) -> Iterator[Pair]:
+    """For each room and each draw a twin, where the draw has another value that is possible."""
+    single = DrawnRooms([program])
+    drawn = {k: room for k in range(rooms) if (room := _redrawn(single, seed, k, {})) is not None}
+    if not drawn:
+        return
+    first, *others = drawn.values()
+    order = _order_of_places(checked)
+    for part in _parts(first):
+        if all(part.value(room) == part.value(first) for room in others):
+            continue
+        for k, room in drawn.items():
+            other = _other(part, single, drawn, k, rooms, seed)
+            if other is None:
+                continue
+            twin = part.alone(other, room)
+            followed = _redrawn(single, seed, k, twin)
+            if followed is None or part.value(followed) != other:
+                continue
+            if part.is_place and _moved(part, room, followed, order):
+                continue
+            yield Pair(k, None, twin, k, part.name, (_only(part.value(room)), _only(other)))
+    if not draws_itself(checked):
+        for k, room in drawn.items():
+            yield Pair(k, room, room, k + rooms, _LATER, ())
+
+
+def _other(
+    part: _Part, single: DrawnRooms, drawn: Mapping[int, dict[str, Any]], k: int, rooms: int, seed: int
+) -> dict[str, Any] | None:
+    """Another value of a part of room k, as one of the `rooms` has it or as drawn anew; None if none was found."""
+    own = part.value(drawn[k])
+    for attempt in range(1, _ATTEMPTS + 1):
+        room = (
+            drawn.get((k + attempt) % rooms)
+            if part.free
+            else _redrawn(single, seed, k + attempt * rooms, part.without(drawn[k]))
+        )
+        if room is not None and part.value(room) not in ({}, own):
+            return part.value(room)
+    return None
+
+
+def _redrawn(single: DrawnRooms, seed: int, index: int, layout: Mapping[str, Any]) -> dict[str, Any] | None:
+    """A room of this number, drawn in a table of one row around a layout; None if nothing can be drawn around it."""
+    try:
+        single.draw(seed, index, layout)
+    except (ValueError, RuntimeError):
+        return None
+    return _kept(single.table.describe(0))
+
+
+def _kept(described: dict[str, Any]) -> dict[str, Any]:
+    """What was drawn, without what happens later."""
+    return {key: value for key, value in described.items() if key not in _HAPPENING}
+
+
+def _order_of_places(checked: CheckedScenario) -> list[Path]:
+    """Where each entity stands in a layout, in the order in which they are put down."""
+    entities = [checked.entities[item.entity] for item in checked.setup if isinstance(item, Placing)]
+    return [(one.key,) if one.index is None else (one.key, one.index) for one in entities]
+
+
+def _moved(part: _Part, room: dict[str, Any], twin: dict[str, Any], order: Sequence[Path]) -> bool:
+    """Whether something that is put down before it had to make room for what the twin pins.
+
+    Then its new place need not be one that is possible.
     """
-
-    def __init__(
-        self,
-        program: Program,
-        checked: CheckedScenario,
-        path: str,
-        values: NDArray[np.int64],
-        by: Sequence[str],
-        seed: int,
-    ) -> None:
-        self._program, self._path, self._values = program, path, values
-        self._cues, self._tellers = {*by, SOMEBODY}, Tellers(program, checked)
-        self._table = Table([program], 2 * len(values))
-        given = [layout for pair in values.tolist() for layout in layouts(program, path, pair)]
-        index = np.repeat(np.arange(len(values)), 2)
-        begin(self._table, seed, {"index": index, "layout": given})
-
-    def start(self, room: int) -> Start:
-        """How the two of a room begin: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
-        rows, state = slice(2 * room, 2 * room + 2), self._table.state
-        return Start(state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy())
-
-    def play(self, actions: Actions) -> TwinComparison:
-        """Do the same in both of each pair until they differ or one of them ends."""
-        pairs = len(self._values)
-        state, ports = self._table.state, self._table.batch.ports
-        running = pairs_alike(self._table)
-        leaks = [
-            self._leak(k, 0, self._between(k, state.registers)) for k in np.flatnonzero(~running).tolist()
-        ]
-        cued, step = list[int](), 0
-        while running.any():
-            before = state.registers.copy()
-            ports.actions[:] = np.repeat(actions(step), 2, axis=0)
-            advance(self._table)
-            step += 1
-            running &= (state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
-            for k in np.flatnonzero(running & ~pairs_alike(self._table)).tolist():
-                running[k] = False
-                tellers = self._between(k, before)
-                if self._cues.isdisjoint(tellers):
-                    leaks.append(self._leak(k, step, tellers))
-                else:
-                    cued.append(k)
-        return TwinComparison(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
-
-    def _between(self, pair: int, before: NDArray[np.int32]) -> list[str]:
-        return self._tellers.between(self._table, (2 * pair, 2 * pair + 1), before)
-
-    def _leak(self, pair: int, step: int, by: Sequence[str]) -> Leak:
-        first, second = layouts(self._program, self._path, self._values[pair].tolist())
-        return Leak(pair, step, (*first["let"].values(), *second["let"].values()), tuple(by))
+    before = order[: order.index(part.where)] if part.where in order else order
+    return any(_at(room, one).get("at") != _at(twin, one).get("at") for one in before)
 
 
-def random_actions(program: Program, pairs: int, seed: int) -> Actions:
-    """Any body action, and half of the time any utterance."""
-    generator = np.random.default_rng(seed)
-    sizes = [len(slot.words) for slot in program.sentences.slots]
-    highest = np.array([program.header(Header.PRIMITIVES) + 1, 2, program.header(Header.TEMPLATES), *sizes])
-    return lambda step: generator.integers(0, highest, (pairs, len(highest)))
+def _at(layout: Mapping[str, Any], where: Path) -> Any:
+    inner: Any = layout
+    for key in where:
+        inner = inner[key]
+    return inner
 
 
-class Script:
-    """The actions of the agent's own frame in rooms 0, 1, ... of a seed, where it knows one of the two values.
-
-    Args:
-        program: of the scenario with a frame for the agent. path, values: of the draw, one value for each room.
-    """
-
-    def __init__(self, program: Program, path: str, values: Sequence[int], seed: int) -> None:
-        self._table = Table([program], len(values))
-        given = layouts(program, path, values)
-        begin(self._table, seed, {"index": np.arange(len(values)), "layout": given})
-
-    def __call__(self, step: int) -> NDArray[np.int64]:
-        """Its actions, which are also done in its own rooms."""
-        actions = self._table.scripted_actions()
-        self._table.batch.ports.actions[:] = actions
-        advance(self._table)
-        return actions
+def _only(value: Mapping[str, Any]) -> Any:
+    """The one value of a part, or all of them."""
+    return next(iter(value.values())) if len(value) == 1 else dict(value)
 
 
-def pairs_alike(table: Table) -> NDArray[np.bool_]:
-    """Whether rows 2k and 2k + 1 show the same and sound the same, (pairs,)."""
-    state = table.state
-    same = np.ones(len(state.registers) // 2, np.bool_)
-    for array in (state.image, state.extra, state.tokens):
-        same &= (array[0::2] == array[1::2]).reshape(len(same), -1).all(axis=1)
-    return same
-
-
-def like_first(table: Table) -> NDArray[np.bool_]:
-    """Whether rows show the same and sound the same as the first, (rows,)."""
-    state = table.state
-    same = np.ones(table.rows, np.bool_)
-    for array in (state.image, state.extra, state.tokens):
-        same &= (array == array[0]).reshape(len(same), -1).all(axis=1)
-    return same
+def draws_itself(checked: CheckedScenario) -> bool:
+    """Whether the script itself draws something, which then also differs when later draws do."""
+    for frame in checked.frames:
+        if frame.entity == 0 and (
+            any(rule.chance is not None for rule in frame.rules)
+            or any(activity.name == "choose" for activity in frame.activities)
+            or any(isinstance(part, Quantification) and part.op == "pick" for part in walk(frame))
+        ):
+            return True
+    return False

@@ -12,7 +12,7 @@ from socialai_dsl.cli.terminal import json_text, shows_color
 from socialai_dsl.diagnostics import ScenarioError, counted, printable, render_text
 
 if TYPE_CHECKING:
-    from socialai_dsl.evaluation.testing import PlayedTest
+    from socialai_dsl.evaluation.scenario_tests import PlayedTest
 
 SUMMARY: Final = "play the tests of scenarios: dialogues that must go as written"
 
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play the tests that were named; one that fails is a finding, one with a mistake cannot be played."""
-    from socialai_dsl.evaluation.testing import play_tests
+    from socialai_dsl.evaluation.scenario_tests import play_tests
 
     is_text = arguments.format == "text"
     try:

@@ -18,7 +18,7 @@ from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.cli.trace_text import Steps, Text
 from socialai_dsl.episodes.traces import TracedEpisode, reset_of
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.saving import TakenDialogue, save_test
+from socialai_dsl.evaluation.saved_tests import TakenDialogue, save_test
 from socialai_dsl.loader.reader import display_name
 
 SUMMARY: Final = "print one episode step by step: the rules that fired, and why the others did not"

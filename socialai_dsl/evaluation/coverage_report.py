@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.effort import EPISODES, Clock
-from socialai_dsl.analysis.tally import Tally, TallyItem, Watch, parts_of
+from socialai_dsl.analysis.tally import Part, Tally, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.factory import make_vec
@@ -77,7 +77,7 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
             yield agent, scripted.name
 
 
-def _parts(scenario: str) -> list[TallyItem]:
+def _parts(scenario: str) -> list[Part]:
     """Everything in a scenario that can come about."""
     return [part for checked in scenarios_of(load(scenario)) for part in parts_of(checked)]
 
@@ -126,7 +126,7 @@ class Counting(Observer):
 class Row:
     """A part and how often it came about with each agent."""
 
-    part: TallyItem
+    part: Part
     times: dict[str, int]
 
     @property
@@ -146,7 +146,7 @@ class Coverage:
 
     def __init__(self) -> None:
         self.scenarios: list[str] = []
-        self.parts: dict[TallyItem, None] = {}
+        self.parts: dict[Part, None] = {}
         self.tallies: dict[str, Tally] = {}
         self.planned, self.interrupted = 0, False
 
@@ -239,7 +239,7 @@ class Coverage:
         }
 
 
-def _place(part: TallyItem) -> str:
+def _place(part: Part) -> str:
     return printable(f"{part.span.file}:{part.span.line}")
 
 

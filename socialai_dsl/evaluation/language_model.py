@@ -89,13 +89,20 @@ def let_a_model_play(
     if find_spec("httpx") is None:
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
     from socialai_dsl.llm.endpoint import EndpointError
-    from socialai_dsl.llm.players import LanguageModelPlayer, Manner, OtherSettings, transcripts
+    from socialai_dsl.llm.players import (
+        LanguageModelPlayer,
+        PromptOptions,
+        SettingsMismatchError,
+        transcripts,
+    )
     from socialai_dsl.llm.view import TextView
 
     endpoint = _endpoint(agent, options)
-    asked: dict[str, Any] = {field.name: getattr(options, field.name, trials) for field in fields(Manner)}
-    manner = Manner(**asked)
-    names = probe_names(loaded) if manner.probes != "off" else ()
+    asked: dict[str, Any] = {
+        field.name: getattr(options, field.name, trials) for field in fields(PromptOptions)
+    }
+    prompting = PromptOptions(**asked)
+    names = probe_names(loaded) if prompting.probes != "off" else ()
     budget = _budget(options.budget, endpoint.prices)
     settings = {
         "scenario": scenario,
@@ -103,17 +110,17 @@ def let_a_model_play(
         "model": endpoint.model,
         "address": endpoint.address,
         **briefing.record(),
-        **vars(manner),
+        **vars(prompting),
         **endpoint.options,
-        "probes": f"{manner.probes} {Asker(loaded).sha256}" if names else None,
+        "probes": f"{prompting.probes} {Asker(loaded).sha256}" if names else None,
     }
     folder = out / scenario_folder_name(scenario) / TRANSCRIPTS
     progress = _Progress(episodes)
     try:
         place = transcripts(folder, settings)
-        player = LanguageModelPlayer(program, endpoint, manner, place, loaded if names else None, briefing)
+        player = LanguageModelPlayer(program, endpoint, prompting, place, loaded if names else None, briefing)
         played = player.play(episodes, options.concurrency, budget, progress.note)
-    except OtherSettings as error:
+    except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
     except EndpointError as error:
         raise UsageError(f"{error}. Episodes so far are kept in {folder}; the same command goes on") from None
@@ -131,11 +138,11 @@ def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:
     Raises:
         UsageError: there are none of this program.
     """
-    from socialai_dsl.llm.players import OtherSettings, kept_episodes
+    from socialai_dsl.llm.players import SettingsMismatchError, kept_episodes
 
     try:
         played = kept_episodes(program, run / TRANSCRIPTS, most)
-    except OtherSettings as error:
+    except SettingsMismatchError as error:
         raise UsageError(str(error)) from None
     if not played:
         raise UsageError(f"{run}: no episode is over")

@@ -266,8 +266,8 @@ class _Work:
     ) -> subprocess.Popen[bytes]:
         threads = str(self._condition["options"].get("threads", 1))
         return subprocess.Popen(
-            [sys.executable, "-m", "socialai_dsl.experiments.leash", PROGRAM, *arguments],
-            stdin=subprocess.PIPE,  # closed when we die, see `leash`
+            [sys.executable, "-m", "socialai_dsl.experiments.ends_with_parent", PROGRAM, *arguments],
+            stdin=subprocess.PIPE,  # closed when we die, see `ends_with_parent`
             stdout=subprocess.DEVNULL if output is None else output,
             stderr=said,
             env=os.environ

@@ -48,7 +48,7 @@ class Reply(Action):
             return {"message": ""}  # nested deeper than can be written, so it says nothing
 
 
-class Told(Observation):
+class TextObservation(Observation):
     """An observation in text."""
 
     text: str = Field(description="what is seen and heard, after what was wrong with the reply, if anything")
@@ -68,7 +68,7 @@ class Progress(State):
     invalid_replies: int = 0
 
 
-class ScenarioEnvironment(Environment[Reply, Told, Progress]):
+class ScenarioEnvironment(Environment[Reply, TextObservation, Progress]):
     """One session.
 
     Args:
@@ -94,7 +94,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         episode_id: str | None = None,
         test_episode: int | None = None,
         **_: Any,
-    ) -> Told:
+    ) -> TextObservation:
         """Begin an episode.
 
         Args:
@@ -114,9 +114,9 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         text = self._episode.reset(seed, test_episode)
         self._begun = True
         self._id, self._seed, self._test_episode = episode_id, seed, test_episode
-        return Told(text=text, instructions=self._episode.instructions, done=False, reward=0.0)
+        return TextObservation(text=text, instructions=self._episode.instructions, done=False, reward=0.0)
 
-    def step(self, action: Reply, timeout_s: float | None = None, **_: Any) -> Told:
+    def step(self, action: Reply, timeout_s: float | None = None, **_: Any) -> TextObservation:
         """Play a reply. Raises ValueError outside of an episode."""
         if not self._begun:
             raise ValueError(
@@ -125,7 +125,7 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         turn = self._episode.step(action.message)
         result = self._episode.result()
         ended = {"success": result.success, "ending": result.ending} if turn.done else {}
-        return Told(text=turn.text, reward=turn.reward, done=turn.done, **ended)
+        return TextObservation(text=turn.text, reward=turn.reward, done=turn.done, **ended)
 
     @property
     def state(self) -> Progress:
@@ -153,14 +153,16 @@ class ScenarioEnvironment(Environment[Reply, Told, Progress]):
         self._episode.close()
 
 
-class ScenarioClient(EnvClient[Reply, Told, Progress]):
+class ScenarioClient(EnvClient[Reply, TextObservation, Progress]):
     """Plays on a server: `ScenarioClient(base_url="http://localhost:8000").sync()`."""
 
     def _step_payload(self, action: Reply) -> dict[str, Any]:
         return {"message": action.message}
 
-    def _parse_result(self, payload: dict[str, Any]) -> StepResult[Told]:
-        told = Told(**{**payload["observation"], "done": payload["done"], "reward": payload["reward"]})
+    def _parse_result(self, payload: dict[str, Any]) -> StepResult[TextObservation]:
+        told = TextObservation(
+            **{**payload["observation"], "done": payload["done"], "reward": payload["reward"]}
+        )
         return StepResult(observation=told, reward=payload["reward"], done=payload["done"])
 
     def _parse_state(self, payload: dict[str, Any]) -> Progress:
@@ -189,7 +191,7 @@ def application(
     app = create_fastapi_app(
         lambda: ScenarioEnvironment(program, style, briefing),
         Reply,
-        Told,
+        TextObservation,
         concurrency_config=limits,
     )
     app.add_middleware(Gate, hosts=tuple(hosts), idle=idle)

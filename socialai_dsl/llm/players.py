@@ -45,7 +45,7 @@ _SHOWN: Final = 4000
 
 
 @dataclass(frozen=True)
-class Manner:
+class PromptOptions:
     """How a model plays.
 
     Attributes:
@@ -114,7 +114,7 @@ class PlayedEpisode:
     answered: Sequence[AnsweredQuestion] = ()
 
 
-class OtherSettings(ValueError):  # noqa: N818 - it says what was found
+class SettingsMismatchError(ValueError):
     """A folder holds episodes that were played otherwise than is asked for now."""
 
 
@@ -127,7 +127,7 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
 
     Raises:
         OSError: the folder cannot be made, or read.
-        OtherSettings: it holds episodes with other settings.
+        SettingsMismatchError: it holds episodes with other settings.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / _SETTINGS
@@ -140,7 +140,9 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
         found = found if isinstance(found, dict) else {}
         other = sorted(key for key in {*content, *found} if content.get(key) != found.get(key))
         if other:
-            raise OtherSettings(f"{folder} holds episodes that were played with another {', '.join(other)}")
+            raise SettingsMismatchError(
+                f"{folder} holds episodes that were played with another {', '.join(other)}"
+            )
     else:
         write_json(path, content)
     return lambda number: _transcript(folder, number)
@@ -160,28 +162,31 @@ def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpis
 
     Raises:
         OSError: a transcript cannot be read.
-        OtherSettings: there are none, or they are of another program.
+        SettingsMismatchError: there are none, or they are of another program.
     """
     try:
         settings = json.loads((folder / _SETTINGS).read_text(encoding="utf-8"))
         settings = {"trials": 1} | settings  # older ones know of no sessions
-        manner = Manner(**{field.name: settings[field.name] for field in fields(Manner)})
+        prompting = PromptOptions(**{field.name: settings[field.name] for field in fields(PromptOptions)})
     except (FileNotFoundError, ValueError, KeyError, TypeError):
-        raise OtherSettings(f"{folder} holds no transcripts of episodes") from None
+        raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
     if settings.get("format") != FORMAT:
-        raise OtherSettings(f"{folder} holds episodes of another version of this program")
+        raise SettingsMismatchError(f"{folder} holds episodes of another version of this program")
     if settings.get("program_sha256") != program.sha256:
-        raise OtherSettings(f"{folder} holds episodes of another version of the scenario")
+        raise SettingsMismatchError(f"{folder} holds episodes of another version of the scenario")
 
     async def nobody(conversation: Conversation) -> Answer:
         raise PolicyDone
 
     policy = ModelPolicy(
-        TextSeat(program, **manner.of_episodes), manner, lambda number: _transcript(folder, number), nobody
+        TextSeat(program, **prompting.of_episodes),
+        prompting,
+        lambda number: _transcript(folder, number),
+        nobody,
     )
     rooms = Rooms(make(program), [policy])
     try:
-        at_once(play_async(rooms, {AGENT: policy}, TestEpisodes(most, manner.trials)))
+        at_once(play_async(rooms, {AGENT: policy}, TestEpisodes(most, prompting.trials)))
         return policy.played[:most]
     finally:
         rooms.env.close()
@@ -196,7 +201,7 @@ class LanguageModelPlayer:
     Args:
         program: of a scenario or suite.
         endpoint: which model is asked, and where.
-        manner: how it plays.
+        prompting: how it plays.
         place: of the transcript of each episode, see `transcripts`.
         loaded: what the program was made of; without it no probes are asked.
         briefing: what the model is told of the task.
@@ -206,16 +211,16 @@ class LanguageModelPlayer:
         self,
         program: Playable,
         endpoint: Endpoint,
-        manner: Manner,
+        prompting: PromptOptions,
         place: Callable[[int], Path],
         loaded: Loaded | None = None,
         briefing: Briefing = NO_BRIEFING,
     ) -> None:
         self._briefing = briefing
-        self._loaded = None if manner.probes == "off" else loaded
+        self._loaded = None if prompting.probes == "off" else loaded
         self._program = program
         self._endpoint = endpoint
-        self._manner = manner
+        self._prompting = prompting
         self._place = place
         self._spent = Usage()
         self._answered = False
@@ -248,7 +253,7 @@ class LanguageModelPlayer:
         budget: Budget,
         progress: Callable[[PlayedEpisode], None] | None,
     ) -> list[PlayedEpisode]:
-        trials = self._manner.trials
+        trials = self._prompting.trials
         sessions = iter(range(0, episodes, trials))
         policies: list[ModelPolicy] = []
         failures: list[Exception] = []
@@ -263,9 +268,9 @@ class LanguageModelPlayer:
                 return await self._ask(client, conversation)
 
             seat = TextSeat(
-                self._program, **self._manner.of_episodes, briefing=self._briefing, probes=self._loaded
+                self._program, **self._prompting.of_episodes, briefing=self._briefing, probes=self._loaded
             )
-            policy = ModelPolicy(seat, self._manner, self._place, ask, progress)
+            policy = ModelPolicy(seat, self._prompting, self._place, ask, progress)
             policies.append(policy)
             rooms = Rooms(make(self._program), [policy])
             try:
@@ -304,7 +309,7 @@ class ModelPolicy(Observer):
 
     Args:
         seat: writes what is seen, and reads what is replied.
-        manner: how the model plays.
+        prompting: how the model plays.
         place: of the transcript of each episode, see `transcripts`.
         ask: the model's answer to a conversation; raises EpisodeOver to leave that episode as it is, and PolicyDone to
             leave all that are left.
@@ -317,12 +322,12 @@ class ModelPolicy(Observer):
     def __init__(
         self,
         seat: TextSeat,
-        manner: Manner,
+        prompting: PromptOptions,
         place: Callable[[int], Path],
         ask: Callable[[Conversation], Awaitable[Answer]],
         progress: Callable[[PlayedEpisode], None] | None = None,
     ) -> None:
-        self._seat, self._manner, self._place, self._ask = seat, manner, place, ask
+        self._seat, self._prompting, self._place, self._ask = seat, prompting, place, ask
         self._progress = progress
         self._rooms: Rooms
         self._conversation: Conversation
@@ -336,11 +341,11 @@ class ModelPolicy(Observer):
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
         number = int(rooms.numbers[0])
-        before = self._conversation if number % self._manner.trials else None
+        before = self._conversation if number % self._prompting.trials else None
         path = self._place(number)
         text = self._seat.begin(rooms, options={"test_episode": number})
         self._rooms, self._fired = rooms, rooms.env.counters()["rules"]
-        self._conversation = Conversation(self._seat, self._manner, number, path, text, before)
+        self._conversation = Conversation(self._seat, self._prompting, number, path, text, before)
 
     async def act(self, observation: Observation) -> NDArray[np.int64]:
         """See `Policy.act`."""
@@ -384,7 +389,7 @@ class Conversation:
 
     Args:
         seat: where an episode has begun.
-        manner: how the model plays.
+        prompting: how the model plays.
         number: of the test episode.
         path: of the transcript, a line of JSON for each reply.
         text: what is seen at the start.
@@ -397,20 +402,20 @@ class Conversation:
     def __init__(
         self,
         seat: TextSeat,
-        manner: Manner,
+        prompting: PromptOptions,
         number: int,
         path: Path,
         text: str,
         before: Conversation | None = None,
     ) -> None:
         self._seat = seat
-        self._manner = manner
+        self._prompting = prompting
         self._number = number
         self._path = path
         self._usage = Usage()
         self._stops: Counter[str] = Counter()
         closing = "" if before is None else f"{before.closing}\n\n"
-        trial, trials = number % manner.trials + 1, manner.trials
+        trial, trials = number % prompting.trials + 1, prompting.trials
         heading = f"Episode {trial} of {trials} begins, in a room of its own.\n" if trials > 1 else ""
         self._text = f"{closing}{heading}{text}"
         self._exchanges: list[list[Mapping[str, Any]]] = [] if before is None else [*before.exchanges]
@@ -443,16 +448,16 @@ class Conversation:
         question = self._seat.question
         text = self._text if question is None else f"{self._text}\n\n{self._put(question)}"
         earlier = [str(exchange[0]["content"]) for exchange in self._exchanges]
-        count, told = left_out(earlier, self._manner.history)
+        count, told = left_out(earlier, self._prompting.history)
         shown = [
             *(message for exchange in self._exchanges[count:] for message in exchange),
             {"role": "user", "content": text},
         ]
         first = {**shown[0], "content": f"{told}{shown[0]['content']}"}
         instructions = self._seat.instructions
-        if self._manner.trials > 1:
+        if self._prompting.trials > 1:
             instructions += (
-                f"\n\nYou play {self._manner.trials} episodes in a row, each in a room of its own, and are told how "
+                f"\n\nYou play {self._prompting.trials} episodes in a row, each in a room of its own, and are told how "
                 "each ended. What you find out in one may help you in the next."
             )
         return [{"role": "system", "content": instructions}, first, *shown[1:]]
@@ -460,14 +465,14 @@ class Conversation:
     def constraints(self) -> dict[str, Any]:
         """The constraints of a request on the form of the reply."""
         if self._seat.question is not None:
-            return constraints(self._seat.question, self._manner.mode, self._manner.grammar)
+            return constraints(self._seat.question, self._prompting.mode, self._prompting.grammar)
         language = self._seat.language
-        if self._manner.mode == "tools":
+        if self._prompting.mode == "tools":
             return {"tools": language.tools()}
-        if self._manner.mode == "json":
+        if self._prompting.mode == "json":
             schema = {"name": "action", "strict": True, "schema": language.json_schema()}
             return {"response_format": {"type": "json_schema", "json_schema": schema}}
-        return {"grammar": language.gbnf()} if self._manner.grammar else {}
+        return {"grammar": language.gbnf()} if self._prompting.grammar else {}
 
     def write(self, answer: Answer) -> dict[str, Any]:
         """Write an answer down; the record that stands in the transcript."""
@@ -475,7 +480,7 @@ class Conversation:
         record: dict[str, Any] = {"observation": self._text, "reply": answer.text}
         if question is not None:
             record |= {"probe": question.probe, "question": self._put(question), "right": question.right}
-        elif self._manner.mode == "tools":
+        elif self._prompting.mode == "tools":
             record["calls"] = [[call.name, call.arguments] for call in answer.calls]
         notes = {"reasoning": answer.reasoning, "stop": answer.stop, "finish_reason": answer.reason}
         record |= {key: note for key, note in notes.items() if note}
@@ -521,7 +526,7 @@ class Conversation:
         if "probe" in record and self._seat.question is None:
             return None  # nobody asks now: the episode is played again from its transcript
         if self._seat.question is not None:
-            if self._manner.probes == "kept":
+            if self._prompting.probes == "kept":
                 put = {"role": "user", "content": self._put(self._seat.question)}
                 self._exchanges.append(
                     [put, {"role": "assistant", "content": _shown(record["reply"]) or "(nothing)"}]
@@ -552,7 +557,7 @@ class Conversation:
             self._replies.append([])
 
     def _put(self, question: Question) -> str:
-        return put(question, self._manner.mode)
+        return put(question, self._prompting.mode)
 
 
 def _shown(reply: str) -> str:

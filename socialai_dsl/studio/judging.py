@@ -18,7 +18,7 @@ from socialai_dsl.studio.messages import RefusalError
 
 if TYPE_CHECKING:
     from socialai_dsl.analysis.reports import Report
-    from socialai_dsl.evaluation.testing import PlayedTest
+    from socialai_dsl.evaluation.scenario_tests import PlayedTest
 
 Reply = dict[str, Any]
 
@@ -50,7 +50,7 @@ def judge_claims(path: str, text: str) -> Reply:
 
 def judge_tests(path: str, text: str) -> Reply:
     """What `socialai test` finds of a text."""
-    from socialai_dsl.evaluation.testing import play_tests
+    from socialai_dsl.evaluation.scenario_tests import play_tests
 
     own = display_name(Path(path))
     try:

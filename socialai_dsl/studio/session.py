@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.authoring.saving import NameTakenError
+from socialai_dsl.authoring.test_text import NameTakenError
 from socialai_dsl.checking.briefing import NO_BRIEFING, brief
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
@@ -269,7 +269,7 @@ class Session:
 
     def write_test(self, name: str, former: str | None = None) -> Reply:
         """What was played as a test, and the file beside the scenario with it."""
-        from socialai_dsl.evaluation.saving import TakenDialogue, written_test
+        from socialai_dsl.evaluation.saved_tests import TakenDialogue, written_test
 
         stage, tracing = self._playing()
         if not stage.steps:

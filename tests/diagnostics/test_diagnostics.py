@@ -20,7 +20,7 @@ import pytest
 from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.diagnostics import CODES, Diagnostic, render_text
-from socialai_dsl.evaluation.testing import play_tests
+from socialai_dsl.evaluation.scenario_tests import play_tests
 from socialai_dsl.frontend import CheckResult, check
 from socialai_dsl.source import Source
 from tests.quick import one_in

@@ -76,7 +76,7 @@ def test_a_script_that_does_not_wait_for_the_word_is_found_out(tmp_path: Path) -
 
 @pytest.mark.parametrize("name", ["talkitout+oracle", "novel/sally_anne+oracle"])
 def test_rooms_are_the_same_to_perception_exactly_if_their_observations_are(name: str) -> None:
-    table = many_rooms(socialai_dsl.compile(socialai_dsl.load(name)), 64, 3)
+    table = many_rooms(socialai_dsl.compile(socialai_dsl.load(name)), 64, 3).table
     table.batch.ports.actions[:] = table.scripted_actions()
     numbers = perceived_so_far(table)
     state = table.state

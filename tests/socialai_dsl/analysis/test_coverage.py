@@ -48,7 +48,7 @@ def covered(tmp_path: Path) -> Coverage:
 
 def test_a_search_finds_what_chance_does_not(covered: Coverage) -> None:
     """All but what follows once the episode has ended."""
-    missing = [(part.kind, part.name) for part in covered.missing]
+    missing = [(part.kind, part.address) for part in covered.missing]
     assert missing == [("rule", "ada.ask.open.then[0]"), ("state", "ada.ask.never")]
 
 

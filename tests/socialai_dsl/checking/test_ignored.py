@@ -6,8 +6,9 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl import frontend
-from socialai_dsl.analysis.coverage import Coverage, CoverageItem
+from socialai_dsl.analysis.coverage import Coverage
 from socialai_dsl.analysis.scenario_report import ScenarioReport
+from socialai_dsl.analysis.tally import Part
 from socialai_dsl.diagnostics import CODES, Diagnostic, Severity
 from socialai_dsl.source import Source, Span
 
@@ -123,7 +124,7 @@ def test_what_trying_out_shows(comment: str, fails: bool) -> None:
     Path("a.yaml").write_text(SCENARIO.format(comment=comment + "\n"), encoding="utf-8")
     checked = frontend.check("a.yaml")
     assert [d.code for d in checked.diagnostics] == ["W306"]
-    state = CoverageItem("state", "honest.courtesy.gone", Span("a.yaml", 11, 7))
+    state = Part(Span("a.yaml", 11, 7), "state", "courtesy.gone", "honest.courtesy.gone")
     report = ScenarioReport("a", 2, 0, coverage=Coverage(4, (state,), True), sources=checked.sources)
     assert report.fails(strict=True) is fails
     assert [d.code for d in report.findings()] == ["W802"] * fails

@@ -19,7 +19,7 @@ xllamacpp = pytest.importorskip("xllamacpp", reason="llama.cpp comes with `make 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
 from socialai_dsl.llm.endpoint import Answer, Endpoint  # noqa: E402
-from socialai_dsl.llm.players import Conversation, Manner, ModelPolicy  # noqa: E402
+from socialai_dsl.llm.players import Conversation, ModelPolicy, PromptOptions  # noqa: E402
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -42,10 +42,12 @@ def endpoint() -> Iterator[Endpoint]:
     del server
 
 
-def played(scenario: str, manner: Manner, path: Path, endpoint: Endpoint, steps: int) -> EpisodeResult:
+def played(
+    scenario: str, prompting: PromptOptions, path: Path, endpoint: Endpoint, steps: int
+) -> EpisodeResult:
     """The model plays so many steps of an episode."""
     env = sd.make(scenario).unwrapped
-    seat = TextSeat(env.program, **manner.of_episodes)  # type: ignore[attr-defined]
+    seat = TextSeat(env.program, **prompting.of_episodes)  # type: ignore[attr-defined]
 
     async def play() -> None:
         async with endpoint.client() as client:
@@ -53,7 +55,7 @@ def played(scenario: str, manner: Manner, path: Path, endpoint: Endpoint, steps:
             async def ask(conversation: Conversation) -> Answer:
                 return await endpoint.ask(client, conversation.messages(), conversation.constraints())
 
-            policy = ModelPolicy(seat, manner, lambda number: path, ask)
+            policy = ModelPolicy(seat, prompting, lambda number: path, ask)
             rooms, agenda = Rooms(env, [policy]), TestEpisodes(1)
             await play_async(rooms, {AGENT: policy}, agenda, lambda: seat.result().steps == steps)
 
@@ -64,7 +66,7 @@ def played(scenario: str, manner: Manner, path: Path, endpoint: Endpoint, steps:
 @pytest.mark.parametrize("scenario", ["talkitout", "school/boxes+pointing", "novel/sally_anne"])
 def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpoint, tmp_path: Path) -> None:
     path = tmp_path / "episode.jsonl"
-    result = played(scenario, Manner(history=1, grammar=True), path, endpoint, STEPS)
+    result = played(scenario, PromptOptions(history=1, grammar=True), path, endpoint, STEPS)
     records = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     assert len(records) == result.replies == result.steps
     assert result.steps == STEPS or result.ending
@@ -73,5 +75,5 @@ def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpo
 
 
 def test_a_schema_holds_it_to_objects(endpoint: Endpoint, tmp_path: Path) -> None:
-    manner = Manner(mode="json", history=1)
-    assert played("help", manner, tmp_path / "episode.jsonl", endpoint, 2).invalid == 0
+    prompting = PromptOptions(mode="json", history=1)
+    assert played("help", prompting, tmp_path / "episode.jsonl", endpoint, 2).invalid == 0

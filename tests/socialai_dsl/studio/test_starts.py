@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.evaluation.testing import play_tests
+from socialai_dsl.evaluation.scenario_tests import play_tests
 from socialai_dsl.frontend import check, closest_script, load
 from socialai_dsl.studio import messages
 from socialai_dsl.studio.files import FileError, Folder

@@ -1,7 +1,7 @@
 """Run a Python module as a program that ends with its parent.
 
-`python -m socialai_dsl.experiments.leash MODULE ARGUMENT...`, with a pipe from the parent as its input. The pipe closes
-when the parent dies in whatever way, so a killed worker leaves no process behind that writes into its run.
+`python -m socialai_dsl.experiments.ends_with_parent MODULE ARGUMENT...`, with a pipe from the parent as its input. The
+pipe closes when the parent dies in whatever way, so a killed worker leaves no process behind that writes into its run.
 """
 
 from __future__ import annotations

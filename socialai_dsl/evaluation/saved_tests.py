@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.atomic import write_text
-from socialai_dsl.authoring.saving import NameTakenError, file_with, test_text
+from socialai_dsl.authoring.test_text import NameTakenError, file_with, test_text
 from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.envs.scenario_env import SILENCE
 from socialai_dsl.episodes.play import Observer, Rooms, Step
 from socialai_dsl.errors import OptionError, UsageError
-from socialai_dsl.evaluation.testing import passes
+from socialai_dsl.evaluation.scenario_tests import passes
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name, read_source, shipped_folder
 from socialai_dsl.loader.resolved import TESTS, taken_apart
