@@ -6,9 +6,13 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests import once
+
 # Tests promise nothing about speed, and a busy machine is no failure.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("untimed")
+
+once.install()
 
 # Small tensors gain nothing from threads, and test machines have few cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")

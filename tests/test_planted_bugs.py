@@ -1,7 +1,9 @@
 """The comparison with the reference has teeth: planted mistakes in what the language means are all found.
 
-Most are planted in the resolved scenario before it is compiled (what a wrong compiler would make of it), the rest in
-the reference's order of events (what a wrong engine would do).
+They are planted in the resolved scenario before it is compiled (what a wrong compiler would make of it), in the
+instructions that the compiler wrote, one kind after the other, and in the reference's order of events (what a wrong
+engine would do). So the compiler and the engine need no tests of what each construct is worth: those of their own are
+about what the comparison cannot see, such as short code and sound tables.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ import numpy as np
 import pytest
 
 from socialai_dsl.compilation import compile_scenario
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.frontend import load
-from socialai_dsl.program import FrameColumn, Header, Program
+from socialai_dsl.program import TESTS, FrameColumn, Header, Op, OpClass, Program
+from socialai_dsl.program.instructions import TABLE
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, RulePlan
 from tests.agreement import Disagreement, Pair, agree
@@ -28,6 +32,7 @@ SAMPLES = Path(__file__).parent / "data" / "agreement"
 COUNTING = str(SAMPLES / "counting.yaml")
 WALKERS = str(SAMPLES / "walkers.yaml")
 PERILS = str(SAMPLES / "perils.yaml")
+SHIPPED_SAMPLES = ("talkitout+oracle", "showme+oracle", "school/boxes+pointing", "novel/interpreter")
 EPISODES = 60
 
 Change = Callable[[CheckedScenario], CheckedScenario]
@@ -135,6 +140,94 @@ def test_a_wrong_compiler_is_found_out(bug: str) -> None:
     assert wrong != checked, "nothing was planted"
     with pytest.raises(Disagreement):
         agree(name, EPISODES, seed=5, program=compile_scenario(wrong))
+
+
+# -- instructions ------------------------------------------------------------------------------------------------
+
+
+def others(program: Program, op: Op, write: Callable[[np.ndarray], None]) -> Program:
+    """The program with all instructions of one kind written otherwise; `write` gets them, int64 (rows, 4)."""
+    words = program.words.copy()
+    start = program.header(Header.CODE_AT)
+    code = words[start : start + program.code.size].reshape(-1, 4)
+    rows = code[code[:, 0] == op]
+    write(rows)
+    code[code[:, 0] == op] = rows
+    return replace(program, words=words)
+
+
+def left_out(rows: np.ndarray) -> None:
+    """They do nothing; a test holds."""
+    rows[:] = (Op.SKIP, 0, 0, 0)
+
+
+def never(rows: np.ndarray) -> None:
+    """They do not hold."""
+    rows[:, :3] = (Op.SKIP, 0, 0)
+
+
+def taken_for(op: Op) -> Callable[[np.ndarray], None]:
+    """They are others."""
+
+    def write(rows: np.ndarray) -> None:
+        rows[:, 0] = op
+
+    return write
+
+
+ALIKE = (
+    (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE),
+    (Op.IF_SAME_CELL, Op.IF_NEXT_TO, Op.IF_FACES, Op.IF_IN_FRONT_OF, Op.IF_EYE_CONTACT, Op.IF_FACES_TOWARD),
+    (Op.IF_IN_LINE, Op.IF_REACHES, Op.IF_LOOKS_AT, Op.IF_UNOBSTRUCTED),
+    (Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX),
+    (Op.LOAD, Op.ABS, Op.COUNT_BITS, Op.LOWEST_BIT),
+    (Op.DISTANCE, Op.QUADRANT),
+    (Op.HEARD_FROM, Op.HEARD_NOUN),
+    (Op.GO_TO, Op.GO_NEXT_TO, Op.FACE),
+    (Op.POINT, Op.EXPLORE),
+    (Op.B_NEXT_TO, Op.B_IN_FRONT_OF),
+    (Op.B_AND, Op.B_OR, Op.B_WITHOUT),
+)
+"""Instructions with the same operands; each is taken for the next."""
+
+UNSEEN = {Op.COUNT}
+"""What an episode does not show: how often a rule fired, which the counters tell."""
+
+WRONG = {
+    **{
+        f"{op.name} is left out": (op, left_out)
+        for op, entry in TABLE.items()
+        if entry.op_class is not OpClass.CONTROL and op not in UNSEEN
+    },
+    **{f"{op.name} never holds": (op, never) for op in TESTS},
+    **{
+        f"{op.name} is {group[k - 1].name}": (op, taken_for(group[k - 1]))
+        for group in ALIKE
+        for k, op in enumerate(group)
+    },
+}
+WRITTEN = [*SHIPPED_SAMPLES, *sorted(str(path) for path in SAMPLES.glob("*.yaml"))]
+
+
+@pytest.mark.parametrize("bug", one_in(15, WRONG, "plays on the slow interpreter"))
+def test_a_wrong_instruction_is_found_out(bug: str) -> None:
+    """By a comparison, or already by the verifier."""
+    op, write = WRONG[bug]
+    programs = {name: compile_scenario(load(name).checked) for name in WRITTEN}
+    written = [name for name, program in programs.items() if op in program.code[:, 0]]
+    assert written, f"no sample has {op.name}"
+    with pytest.raises((Disagreement, InvalidProgramError)):
+        compare({name: others(programs[name], op, write) for name in written})
+
+
+def compare(programs: dict[str, Program]) -> None:
+    """Verify each program, and play it beside the reference."""
+    for name, program in programs.items():
+        verify(program)
+        agree(name, EPISODES, seed=5, program=program)
+
+
+# -- order -------------------------------------------------------------------------------------------------------
 
 
 def npcs_in_reverse(program: Program) -> Program:

@@ -115,12 +115,12 @@ def test_what_trace_prints_can_be_replayed(capsys: Capture) -> None:
 
 
 def test_a_run_writes_what_its_agent_expected() -> None:
-    assert run_main(["talkitout", *QUICK, "--recipe", "plain", "--out", "run"]) == 0
+    assert run_main(["dance", *QUICK, "--recipe", "plain", "--out", "run"]) == 0
     traces = [Trace.model_validate(trace) for trace in episodes_in(Path("run", "episode.html"))]
     assert all(moment.thought is not None for trace in traces for moment in trace.moments[1:])
     for moment in traces[0].moments[1:]:
         assert moment.thought is not None
-        assert [len(head) for head in moment.thought.probabilities] == [8, 2, 4, 16]
+        assert [len(head) for head in moment.thought.probabilities] == [4, 2, 2, 2]
         assert all(sum(head) == pytest.approx(1, abs=0.005) for head in moment.thought.probabilities)
         assert moment.action is not None
         chosen = [head[k] for head, k in zip(moment.thought.probabilities, moment.action, strict=True)]

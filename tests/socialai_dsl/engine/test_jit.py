@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.engine.jit import is_interpreted
-from socialai_dsl.loader.resolved import shipped_names
-from tests.test_agreement import FOLDERS, alone
+from tests.shipped import scenarios
 
 pytestmark = [
     pytest.mark.skipif(is_interpreted(), reason="nothing is compiled"),
@@ -102,5 +101,5 @@ def test_plain_python_plays_the_same_without_a_warning() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_plain_python_plays_every_scenario_without_a_warning() -> None:
-    names = [name for name in (*shipped_names(), *FOLDERS) if alone(name)]
+    names = scenarios()
     assert printed(PLAY, "3", "1", *names, **PLAIN) == printed(PLAY, "3", "1", *names)
