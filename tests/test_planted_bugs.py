@@ -18,6 +18,7 @@ import pytest
 
 from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
+from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.frontend import load
 from socialai_dsl.program import TESTS, FrameColumn, Header, Op, OpClass, Program
 from socialai_dsl.program.instructions import TABLE
@@ -190,8 +191,8 @@ ALIKE = (
 )
 """Instructions with the same operands; each is taken for the next."""
 
-UNSEEN = {Op.COUNT}
-"""What an episode does not show: how often a rule fired, which the counters tell."""
+UNSEEN = {Op.COUNT, Op.IF_UNPINNED}
+"""What an episode does not show: how often a rule fired, which the counters tell, and what a layout gives."""
 
 WRONG = {
     **{
@@ -199,7 +200,7 @@ WRONG = {
         for op, entry in TABLE.items()
         if entry.op_class is not OpClass.CONTROL and op not in UNSEEN
     },
-    **{f"{op.name} never holds": (op, never) for op in TESTS},
+    **{f"{op.name} never holds": (op, never) for op in TESTS if op not in UNSEEN},
     **{
         f"{op.name} is {group[k - 1].name}": (op, taken_for(group[k - 1]))
         for group in ALIKE
@@ -209,22 +210,25 @@ WRONG = {
 WRITTEN = [*SHIPPED_SAMPLES, *sorted(str(path) for path in SAMPLES.glob("*.yaml"))]
 
 
-@pytest.mark.parametrize("bug", one_in(15, WRONG, "plays on the slow interpreter"))
+@pytest.mark.parametrize("bug", one_in(10, WRONG, "plays on the slow interpreter"))
 def test_a_wrong_instruction_is_found_out(bug: str) -> None:
     """By a comparison, or already by the verifier."""
     op, write = WRONG[bug]
     programs = {name: compile_scenario(load(name).checked) for name in WRITTEN}
-    written = [name for name, program in programs.items() if op in program.code[:, 0]]
+    often = {name: int(np.count_nonzero(program.code[:, 0] == op)) for name, program in programs.items()}
+    written = sorted((name for name in often if often[name]), key=lambda name: -often[name])
     assert written, f"no sample has {op.name}"
-    with pytest.raises((Disagreement, InvalidProgramError)):
+    with pytest.raises((Disagreement, InvalidProgramError, RoomError)):
         compare({name: others(programs[name], op, write) for name in written})
 
 
 def compare(programs: dict[str, Program]) -> None:
-    """Verify each program, and play it beside the reference."""
+    """Verify each program, and play it beside the reference: a little of all first, then more."""
     for name, program in programs.items():
         verify(program)
-        agree(name, EPISODES, seed=5, program=program)
+        agree(name, 2, seed=5, program=program)
+    for name, program in programs.items():
+        agree(name, EPISODES, seed=6, program=program)
 
 
 # -- order -------------------------------------------------------------------------------------------------------

@@ -451,6 +451,17 @@ def _call(node: ast.Call, context: Context) -> Any:
     return _verb(subject, node, context)
 
 
+DIRECTED = {"in_front_of", "faces", "faces_toward", "looks_at", "eye_contact", "sees"}
+"""Relations that depend on where somebody looks."""
+
+
+def know_facing(context: Context, *things: Any) -> None:
+    """While a room is set up: those whose direction is asked for are turned first."""
+    for thing in things:
+        if context.setup and isinstance(thing, Entity):
+            context.setup.compute_facing(thing)
+
+
 def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
     name, world = node.name, context.world
     if name == "is":
@@ -471,6 +482,8 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
         return any(thing.carrier is subject for thing in as_list(arguments[0]))
     if name == "toggled_by":
         return any(user in subject.toggled_by for user in as_list(arguments[0]))
+    if name in DIRECTED:
+        know_facing(context, subject, *arguments)
     return getattr(geometry, name)(world, subject, *arguments)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import geometry
-from tests.reference.evaluate import Context, of
+from tests.reference.evaluate import DIRECTED, Context, know_facing, of
 from tests.reference.source import Value
 from tests.reference.world import SIDES, Cell, World, as_list
 
@@ -29,6 +29,8 @@ def cells_of(node: Any, context: Context) -> list[Cell]:
         return list(dict.fromkeys(together))
     name = node.id if isinstance(node, ast.Name) else node.name
     arguments = [of(argument, context) for argument in getattr(node, "args", ())]
+    if name in DIRECTED:
+        know_facing(context, *arguments)
     if name == "wall":
         return [cell for side in as_list(arguments[0]) for cell in wall(world, side, 1)]
     if name == "each_wall":

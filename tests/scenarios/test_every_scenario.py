@@ -140,14 +140,14 @@ def test_the_picture_after_each_step(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in NAMES if "cointhief" not in name])
 @pytest.mark.thorough("draws many rooms of every scenario")
 def test_rooms_are_of_sixteen_sizes(name: str) -> None:
-    sizes = ((room["room"]["width"], room["room"]["height"]) for room in rooms(name, 2000))
+    sizes = ((room["room"]["width"], room["room"]["height"]) for room in rooms(name, 1000))
     check_shares(sizes, evenly(product(range(5, 9), repeat=2)))
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.thorough("draws many rooms of every scenario")
 def test_poses_and_colours_at_first(name: str) -> None:
-    drawn = list(rooms(name, 1500))
+    drawn = list(rooms(name, 1000))
     if not name.startswith("cointhief"):
         assert all(room[member]["facing"] == "down" for room in drawn for member in CAST if member in room)
     check_shares((room["agent"]["facing"] for room in drawn), evenly(WAYS))

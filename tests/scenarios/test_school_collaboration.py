@@ -134,10 +134,10 @@ class TestAll:
 class TestAppleStealing:
     def test_the_room(self) -> None:
         sizes = (
-            (room["room"]["width"], room["room"]["height"]) for room in rooms("school/apple_stealing", 1500)
+            (room["room"]["width"], room["room"]["height"]) for room in rooms("school/apple_stealing", 1000)
         )
         check_shares(sizes, evenly(product(range(7, 11), repeat=2)))
-        facing = (room["guard"]["facing"] for room in rooms("school/apple_stealing", 1500))
+        facing = (room["guard"]["facing"] for room in rooms("school/apple_stealing", 1000))
         check_shares(facing, evenly(FORWARD))
 
     @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import socialai_dsl as sd
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import (
     BOARDS,
@@ -27,8 +28,7 @@ from socialai_dsl.program import (
     Register,
     TypeColumn,
 )
-from socialai_dsl.semantics.terms import Compare, Type
-from tests.socialai_dsl.compiler.workbench import DIE, GUIDE, compiled, number, sited, with_let, workbench
+from tests.tiny import Folder
 
 Code = Sequence[tuple[int, ...]]
 RESET, RULES, REQUIRE = Header.RESET_PC, Header.RULES_PC, Header.REQUIRE_PC
@@ -46,12 +46,40 @@ def cell(x: int, y: int) -> int:
     return const(CELL + 32 * y + x)
 
 
+SCENARIO = """
+scenario: workbench
+horizon: 20
+earshot: room
+actions: [left, right, forward, toggle]
+grammar: {templates: [Go <noun>, Look <noun>], nouns: [up, down]}
+room: {size: 7}
+objects:
+  door: {type: door, at: [6, 2], color: red}
+  box: {type: ball, at: [3, 3], color: blue}
+  switches: {type: switch, at: [[1, 0], [2, 0]], color: green}
+let:
+  die: pick(0 | 1 | 2 | 3)
+  lucky: pick(box | door)
+  n: pick(0..5)
+require: [die < 3]
+cast:
+  guide: {at: [4, 3], facing: left, color: red, frame: idle}
+  statue: {at: [4, 5], facing: up, color: red}
+  agent: {at: [2, 3], facing: right, color: red}
+frames:
+  idle: {states: {waiting: {do: stay}}}
+outcome:
+  - success: agent.at(door)
+"""
+GUIDE = 1
+
+
 @pytest.fixture(scope="module")
-def program() -> Program:
+def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
     """A program with code at three entries, each replaced by a test."""
-    checked = with_let(workbench(), "let.n", number(0), Type("int", 0, 5))
-    never = sited(Compare("==", DIE, number(9)), "require[0]")
-    return compiled(replace(checked, require=(never,)))
+    found = sd.compile(sd.load(Folder(tmp_path_factory.mktemp("verifier")).save("workbench", SCENARIO)))
+    assert isinstance(found, Program)
+    return found
 
 
 def with_code(program: Program, entry: Header, code: Code) -> Program:

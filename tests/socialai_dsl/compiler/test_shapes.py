@@ -8,68 +8,6 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.program import CELL
-from socialai_dsl.semantics.terms import Compare, Logic, Not, Term
-from socialai_dsl.semantics.terms import Test as Relation
-from tests.socialai_dsl.compiler.workbench import (
-    AGENT,
-    BOX,
-    DOOR,
-    GUIDE,
-    HERE,
-    NUMBER,
-    cell,
-    cells,
-    compiled,
-    entity,
-    number,
-    with_let,
-    workbench,
-    worth,
-    x_of,
-    y_of,
-)
-
-SHAPES = {
-    **{f"x {op} {k}": Compare(op, x_of(HERE), number(k)) for op in ("==", "<", "<=") for k in (-1, 1, 3, 40)},  # type: ignore[arg-type]
-    **{f"{k} {op} y": Compare(op, number(k), y_of(HERE)) for op in ("==", "<", "<=") for k in (-1, 1, 3, 40)},  # type: ignore[arg-type]
-    "x of the guide": Compare("<=", x_of(HERE), x_of(entity(GUIDE))),
-    **{
-        f"{name} {thing}": Relation(name, HERE, entity(thing))  # type: ignore[arg-type]
-        for name in ("at", "next_to", "in_line", "in_front_of")
-        for thing in (AGENT, GUIDE, DOOR, BOX)
-    },
-    "in line with a cell": Relation("in_line", HERE, cell(5, 2)),
-}
-
-
-def asked_one_by_one(condition: Term) -> Term:
-    """The same in a form that is no shape."""
-    return Logic("or", (condition, Not(Not(condition))))
-
-
-def loops(term: Term) -> bool:
-    return "EACH_CELL" in compiled(with_let(workbench(), "let.answer", term)).listing()
-
-
-@pytest.mark.parametrize("condition", SHAPES.values(), ids=SHAPES)
-@pytest.mark.thorough("compiles a scenario for each shape")
-def test_a_shape_has_the_cells_that_a_loop_finds(condition: Term) -> None:
-    each = asked_one_by_one(condition)
-    assert not loops(cells("count", condition, NUMBER))
-    assert loops(cells("count", each, NUMBER))
-    for wanted in (condition, Not(condition)):
-        other = each if wanted is condition else Not(each)
-        assert worth(cells("count", wanted, NUMBER)) == worth(cells("count", other, NUMBER))
-        assert worth(cells("first", wanted)) == worth(cells("first", other))
-
-
-def test_shapes_of_a_conjunction_come_first_and_the_rest_is_asked_of_what_is_left() -> None:
-    odd = asked_one_by_one(Relation("next_to", HERE, entity(AGENT)))
-    both = Logic("and", (odd, Compare("==", x_of(HERE), number(2))))
-    assert worth(cells("count", both, NUMBER)) == 2, "above and below the agent"
-    assert worth(cells("first", both)) == CELL + 32 * 2 + 2
-
 
 SCENARIO = """
 scenario: shapes
@@ -129,12 +67,3 @@ def test_what_is_the_same_for_all_cells_is_asked_once(tmp_path: Path) -> None:
         state = env.describe()
         seen.add((state["let"]["number"], state["box"]["at"] is not None))
     assert seen == {(1, False), (2, True)}
-
-
-def test_what_all_have_to_be_is_taken_apart() -> None:
-    """Nested conjunctions and negated disjunctions are shapes one after another."""
-    at_either = Logic("or", (Relation("at", HERE, entity(AGENT)), Relation("at", HERE, entity(GUIDE))))
-    nested = Logic("and", (Compare("!=", x_of(HERE), number(1)), Not(at_either)))
-    whole = Logic("and", (Relation("in_line", HERE, entity(AGENT)), nested))
-    assert not loops(cells("count", whole, NUMBER))
-    assert worth(cells("count", whole, NUMBER)) == worth(cells("count", asked_one_by_one(whole), NUMBER)) == 6

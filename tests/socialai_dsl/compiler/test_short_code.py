@@ -194,3 +194,59 @@ def test_only_who_believes_perceives(tmp_path: Path) -> None:
 
     assert not perceives(ann("do: stay"))
     assert perceives("cast: {ann: {at: [3, 3], beliefs: {near: {of: next_to(agent)}}}}")
+
+
+ABOUT = """
+objects:
+  lamp: {{type: ball, at: [5, 5], tagged: "{}"}}
+  door: {{type: door, at: [6, 2]}}
+  box: {{type: ball, at: [3, 5]}}
+  switches: {{type: switch, at: [[1, 0], [2, 0]]}}
+let: {{die: pick(0..3)}}
+state: {{written: 0}}
+rules: [{{when: t == 3, set: {{written: 1}}}}, {{when: t == 5, cause: box.vanish}}]
+frames: {{f: {{start: a, states: {{a: {{do: {}}}}}}}}}
+cast: {{guide: {{frame: f, at: [4, 3]}}, statue: {{at: [4, 5]}}}}
+"""
+"""The guide turns and the statue does nothing; the box vanishes; nothing but a condition changes the lamp."""
+
+NEVER = (
+    *("die == 2", "W == 6", "agent.color == red", "statue.x == 2", "statue.facing == up", "guide.x == 3"),
+    *("statue.distance(door) < 3", "statue.next_to(door)", "statue.faces(door)", "statue.sees(door)"),
+    "any(c in cells where c.next_to(door))",
+)
+MARKED = (
+    *("written == 1", "box.y == 2", "box.gone", "statue.distance(box) < 3", "statue.unobstructed(door)"),
+    *("statue.looks_at(door)", "die == 2 and any(s in switches where s.pressed)"),
+    *("not any(s in switches where s.pressed)", "nearest(s in switches to statue).pressed"),
+)
+ALWAYS = (
+    *("t == 2", "agent.spoke", "agent.action == left", "prev(t) == 2", "agent.x == 2", "agent.next_to(door)"),
+    *("guide.facing == up", "guide.faces(door)", "guide.looks_at(door)", "guide.sees(door)", "guide.is(a)"),
+    *("statue.eye_contact(guide)", "statue.in_front_of(guide)", "statue.can_reach(door)"),
+    *(
+        "statue.sees(agent)",
+        "any(c in cells where c.next_to(agent))",
+        "nearest(s in switches to agent).pressed",
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("condition", "when"),
+    [(one, when) for when, all_ in enumerate((NEVER, MARKED, ALWAYS)) for one in all_],
+)
+def test_a_status_is_settled_when_it_can_change(condition: str, when: int, tmp_path: Path) -> None:
+    """0: by the reset; 1: after a status, place or register was changed that it reads; 2: in every step."""
+    assert settled(compiled(tmp_path, ABOUT.format(condition, "turn_to(down)"))) == when
+
+
+@pytest.mark.parametrize(("do", "when"), [("stay", 0), ("left", 0), ("forward", 2), ("go_to(door)", 2)])
+def test_only_who_walks_changes_a_place(do: str, when: int, tmp_path: Path) -> None:
+    assert settled(compiled(tmp_path, ABOUT.format("guide.x == 3", do))) == when
+
+
+def settled(program: Program) -> int:
+    """How often a status is settled, of 0 to 2."""
+    always = program.header(Header.FLAGS) & Flag.SETTLE_ALWAYS
+    return bool(program.header(Header.SETTLE_PC)) + bool(always)

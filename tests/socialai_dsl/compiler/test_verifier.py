@@ -222,3 +222,11 @@ cast: {agent: {}, ann: {frame: talk}}
 rules: [{when: t > 3, reward: 5}]
 outcome: [{success: agent.at(door)}]
 """
+
+
+@pytest.mark.parametrize(("position", "value"), [(0, 7000), (1, -1), (2, -1)])
+def test_questions_about_nothing_are_refused(position: int, value: int) -> None:
+    """Who said what was heard is asked of a place in an inbox."""
+    chatter = sd.compile(sd.load(Path(__file__).parents[2] / "data" / "agreement" / "chatter.yaml"))
+    with pytest.raises(InvalidProgramError, match="HEARD_FROM"):
+        verify(mutated(chatter, set_code(Op.HEARD_FROM, position, value)))
