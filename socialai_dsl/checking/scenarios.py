@@ -24,7 +24,7 @@ from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import Data, DataPath, Node
+from socialai_dsl.source import Data, DataPath, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
@@ -389,9 +389,12 @@ def with_findings_on_rivals(
 ) -> DiagnosticBag:
     """What was found in a scenario without errors, and what is wrong with its rivals, each checked where it plays.
 
-    What a rival has a use for is not reported as idle.
+    What a rival has a use for is not reported as idle. The agent's own frame, which nobody follows while a rival plays,
+    is judged without it, and a rival by itself.
     """
     bag, idle = DiagnosticBag(), {d for d in found if d.code in _OF_ALL_VARIANTS}
+    own_frame = scenario.members()["agent"].frame if "agent" in scenario.members() else None
+    judged = {d for d in idle if own_frame and _is_in(resolved.tree.get(("frames", own_frame)), d.span)}
     for name, rival in scenario.rivals.items():
         own = DiagnosticBag()
         if scenario.frames.get(name) == rival:  # it plays already
@@ -401,9 +404,17 @@ def with_findings_on_rivals(
             own.error("S213", f"there is a frame `{name}`; call the rival something else", span)
         else:
             check_scenario(with_rival(resolved, name), own)
-        bag.extend(d for d in own if d.code not in _OF_ALL_VARIANTS)
-        idle &= set(own)
+        written = resolved.tree.get(("rivals", name))
+        bag.extend(d for d in own if d.code not in _OF_ALL_VARIANTS or _is_in(written, d.span))
+        idle &= {*own, *judged}
     return DiagnosticBag([*(d for d in found if d.code not in _OF_ALL_VARIANTS), *idle, *bag])
+
+
+def _is_in(part: Node | None, span: Span) -> bool:
+    """Whether a place is in a part of a document."""
+    if part is None or span.file != part.file:
+        return False
+    return part.span.start <= part.source.index(span) < part.end
 
 
 def _report_idle_variants(resolved: ResolvedFile, bag: DiagnosticBag) -> None:

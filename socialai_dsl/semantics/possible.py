@@ -24,6 +24,7 @@ from socialai_dsl.semantics.terms import (
     Select,
     SitedTerm,
     Term,
+    changed,
     draws,
     is_looked_for,
     is_own_noun,
@@ -474,10 +475,11 @@ def _by_place(found: Iterable[tuple[Span, SitedTerm]]) -> Iterator[tuple[Span, l
 
 
 def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
-    in_frames = (rule for frame in checked.frames for rule in frame.rules)
-    for rule in (*in_frames, *checked.rules):
-        if rule.when is not None:
-            yield rule.when.span, rule.when
+    for frame in checked.frames:
+        for rule in frame.rules:
+            if rule.when is not None:
+                yield rule.when.span, _in_turn(frame, rule.when)
+    yield from ((rule.when.span, rule.when) for rule in checked.rules if rule.when is not None)
 
 
 def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
@@ -486,14 +488,31 @@ def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, Sited
         asked = [step.when for step in frame.steps] + [
             c for block in nested for c in (block.when, block.going)
         ]
-        yield from ((condition.span, condition) for condition in asked if condition is not None)
+        yield from ((one.span, _in_turn(frame, one)) for one in asked if one is not None)
 
 
 def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     for frame in checked.frames:
         for step in frame.steps:
             if step.until is not None:
-                yield step.until.span, step.until
+                yield step.until.span, _in_turn(frame, step.until)
+
+
+class _SaidLater(terms.SaidBy):
+    """What a member says in this step that has its turn later, so that it is never said yet."""
+
+    __slots__ = ()
+
+
+def _in_turn(frame: FramePlan, condition: SitedTerm) -> SitedTerm:
+    """A condition as it is asked in the turn of a member: those who come after it have said nothing in this step."""
+
+    def later(term: Term) -> Term | None:
+        if isinstance(term, terms.SaidBy) and term.entity > frame.entity:
+            return _SaidLater(term.entity, term.pattern)
+        return None
+
+    return replace(condition, term=changed(condition.term, later))
 
 
 def _those(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
@@ -536,6 +555,8 @@ class Possible:
         match term:
             case Const(value=value):
                 return bool(value) is wanted
+            case _SaidLater():
+                return not wanted
             case terms.Not(arg=arg):
                 return self._may(arg, not wanted)
             case terms.Logic(op=op, args=args):
@@ -597,6 +618,11 @@ class Possible:
                 return next((why for arg in args if (why := self._why(arg))), None)
             case terms.Quantification(condition=condition, items=items) if condition is not None and items:
                 return self._why(condition)
+            case _SaidLater(entity=entity):
+                who = self._checked.entities[entity].key
+                return (
+                    f"`{who}` has its turn later in the step: what it said is heard by `hears:`, `heard(any)`"
+                )
             case terms.Compare(left=left, right=right) if not isinstance(left, Const) or not isinstance(
                 right, Const
             ):

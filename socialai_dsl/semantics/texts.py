@@ -72,7 +72,10 @@ def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
 
 
 def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
-    """Whether the NPC whose frame it is heard one of the texts at `node` since its last turn."""
+    """Whether the NPC whose frame it is heard one of the texts at `node`, or `any`, since its last turn."""
+    if isinstance(node, ast.Name) and node.id == ANYTHING:
+        found = for_ears(resolver, [(resolver.utterances.anything(), None)], scope)
+        return any_of(all_of([Heard((pattern,)), *_given(given)]) for pattern, given in found)
     return any_of(
         all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
         for text, drawn, span in texts(resolver, node, scope)
@@ -94,7 +97,13 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
             message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
             slots = scope.frame.texts if scope.frame is not None else ()
             near = did_you_mean(option.id, slots) if isinstance(option, ast.Name) else None
-            raise resolver.fail("S211", message, option, scope, suggestion=near)
+            anything = isinstance(option, ast.Name) and option.id == ANYTHING
+            hint = (
+                "whether something was said is `agent.spoke`; what was heard, `heard(any)`"
+                if anything
+                else None
+            )
+            raise resolver.fail("S211", message, option, scope, suggestion=near, hint=hint)
     return found
 
 

@@ -468,6 +468,8 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
         return any(_in_state(subject, option, context) for option, _ in weighed(node.args[0]))
     if name == "did":
         return subject.action in as_list(of(node.args[0], context))
+    if name == "heard" and isinstance(node.args[0], ast.Name) and node.args[0].id == "any":
+        return bool(subject.inbox)
     if name in ("said", "heard"):
         patterns = [pattern(option, context) for option, _ in weighed(node.args[0])]
         texts = [heard.text for heard in subject.inbox] if name == "heard" else [subject.utterance]

@@ -549,7 +549,7 @@ class Phrases:
         options += [lambda: self.of_slot(where)] * (2 * len(where.slots))
         options += [f"{npc}.spoke" for npc in known.members if npc in known.follows]
         if where.frame is not None and not (where.searching or where.still):
-            options += [lambda: f'heard("{self.heard()}")'] * 2
+            options += [lambda: f'heard("{self.heard()}")', "heard(any)"]
             options += [f"agent.noun == {name}" for name in where.frame.nouns]
         if where.noun:
             options += [lambda: f"noun == {self.noun()}", lambda: f"noun != {self.entity(where)}.color"]
