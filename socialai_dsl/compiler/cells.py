@@ -720,14 +720,15 @@ def _shift(switch: _Switch) -> int | None:
 def among(to: Emitter, key: int, type_: Type, numbers: Set[int], otherwise: Label) -> None:
     """Fall through if an operand of this type is one of these numbers."""
     block, low, high = to.block, type_.low, type_.high
-    numbers = numbers & set(range(low, high + 1))
-    others = set(range(low, high + 1)) - numbers
+    numbers = {number for number in numbers if low <= number <= high}
+    others = type_.size - len(numbers)  # how many; of a wide type they are too many to be listed
     if not numbers:
         block.skip(otherwise)
     elif len(numbers) == 1:
         block.test(Op.IF_EQ, key, constant(min(numbers)), otherwise)
-    elif len(others) == 1:
-        block.test(Op.IF_NE, key, constant(min(others)), otherwise)
+    elif others == 1:
+        other = next(number for number in range(low, high + 1) if number not in numbers)
+        block.test(Op.IF_NE, key, constant(other), otherwise)
     elif others and low >= 0 and high < _WORD_BITS and max(numbers) < _MASK_BITS:
         block.test(Op.IF_BIT, constant(sum(1 << number for number in numbers)), key, otherwise)
     elif others:

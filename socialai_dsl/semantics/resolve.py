@@ -49,6 +49,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUES, WORDS
 from socialai_dsl.semantics.words.use import Use
+from socialai_dsl.vocabulary import is_number
 
 
 def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
@@ -272,10 +273,7 @@ class ScenarioResolver(Resolver):
         worded = (*WORDED, "int")
         if left.type.kind in worded and right.type.kind in worded and (left.type.words or right.type.words):
             alike = any_of(
-                all_of([_is(left, i), _is(right, j)])
-                for i in left.type.values
-                for j in right.type.values
-                if spoken(left.type, i) == spoken(right.type, j)
+                all_of([_is(left, i), _is(right, j)]) for i, j in _called_alike(left.type, right.type)
             )
             # Both are asked for, even if none of their values are called the same.
             return all_of([*_asked_for(left, right), alike])
@@ -348,6 +346,22 @@ class ScenarioResolver(Resolver):
         if left.type.kind == "direction":
             return left, self.value(node.right, TURN, scope)
         return self.fit(left, INT, node.left, scope), self.value(node.right, INT, scope)
+
+
+def _called_alike(left: Type, right: Type) -> list[tuple[int, int]]:
+    """Values of two types that are called the same, in ascending order; of numbers without end only those are looked at
+    that the other type has words for.
+    """
+    if not left.words:
+        return sorted((i, j) for j, i in _called_alike(right, left))
+    known: dict[str, list[int]] = {}
+    for i in left.values:
+        known.setdefault(spoken(left, i), []).append(i)
+    if right.words:
+        return sorted((i, j) for j in right.values for i in known.get(spoken(right, j), ()))
+    numbers = ((word, int(word)) for word in known if is_number(word))
+    fitting = [(word, j) for word, j in numbers if str(j) == word and right.low <= j <= right.high]
+    return sorted((i, j) for word, j in fitting for i in known[word])
 
 
 def _both_hold(left: Term, right: Term) -> Term:

@@ -175,8 +175,8 @@ def number_of_texts(line: Line) -> int:
 
 
 def words_of_values(type_: Type) -> list[str]:
-    """The word of each value of a type."""
-    return [spoken(type_, value) for value in type_.values]
+    """The word of each value of a type; of a wide type of the first `MAX_TEXTS`, more than any text may have."""
+    return [spoken(type_, value) for value in type_.values[:MAX_TEXTS]]
 
 
 # -- registers: what is drawn or computed once at reset ------------------------------------------------------

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, groupby, islice, pairwise, product
+from math import prod
 from typing import TypeGuard
 
 from socialai_dsl import cures
@@ -163,6 +164,11 @@ def _meant(
 ) -> list[tuple[Pattern, Term | None]]:
     """The patterns of a text without slots, on the condition that what `drawn` says was drawn."""
     parts = [_spoken_part(resolver, part, scope) for part in spliced]
+    number = prod(1 if isinstance(part, str | Const) else part.type.size for part in parts)
+    if number > MAX_TEXTS:
+        message = f"this can be {number:,} different texts; at most {MAX_TEXTS:,} are possible"
+        hint = "give the register a smaller range, or hear `<noun>` and compare: `when: noun == price`"
+        raise resolver.findings.fail("S212", message, span, hint=hint)
     found: list[tuple[Pattern, Term | None]] = []
     unsayable: list[tuple[str, str]] = []
     for choice in product(*(_choices(part) for part in parts)):
