@@ -23,7 +23,7 @@ from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict
 from socialai_dsl.analysis.knowable import TOGETHER, Knowability, Knowing, RoomKnown, followed
 from socialai_dsl.analysis.leaks import Script, Tellers, TwinComparison, Twins
 from socialai_dsl.analysis.muting import muted
-from socialai_dsl.analysis.perceiving import perceived
+from socialai_dsl.analysis.perceiving import PerceptionResult, perceived
 from socialai_dsl.analysis.reports import (
     SHOWN,
     Evidence,
@@ -51,6 +51,8 @@ _HOLDS: Final = "the property holds"
 _AS_TRIED: Final = " (chance during the episode, such as which way somebody turns, was tried only in part)"
 RIVAL_ROOMS: Final = 500
 """In how many rooms a rival plays, at least."""
+_PORTIONS: Final = 8
+"""Of how many parts of the rooms one is looked at first, where all of them may take too long."""
 _OF_ITSELF: Final = "a success comes of itself, without the agent"
 
 
@@ -293,23 +295,36 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     """Whether the script acts on what it has perceived alone."""
     if trial.script is None:
         return _NOBODY_PLAYS
-    found = perceived(trial.script, effort.rooms, effort.seed)
+    rooms, found = _perceived_in(trial.script, effort)
     divided = [number for one in found.divisions for number in one.others]
     # Of the rooms that were drawn beside those that were asked for, the first will do.
-    divided = [number for number in divided if number < effort.rooms] or sorted(divided)[:1]
+    divided = [number for number in divided if number < rooms] or sorted(divided)[:1]
     against = sorted({*(peek.index for peek in found.peeks), *divided})
-    held = effort.rooms - len(against)
+    held = rooms - len(against)
     if found.pairs == found.groups == 0:
         said = "it rests on nothing: no two rooms look alike at first"
-        return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
-    said = f"in {held} of {rooms_text(effort.rooms)} the script acts on what it has perceived alone"
+        return Report(Verdict.FAILS, rooms, 0, 0, (), said, 0)
+    said = f"in {held} of {rooms_text(rooms)} the script acts on what it has perceived alone"
     said += f" ({found.pairs} pairs of rooms that look alike and differ in one draw, "
     said += f"{found.groups} groups that differ in any)"
     for one in (*found.peeks, *found.divisions)[:1]:
         said += f"; {one}"
     share = 1.0 if plan.share is None else plan.share
-    verdict = by_share(held, 0, effort.rooms, share)
-    return Report(verdict, effort.rooms, held, 0, tuple(against[:SHOWN]), said, effort.rooms, found.pairs)
+    verdict = by_share(held, 0, rooms, share)
+    return Report(verdict, rooms, held, 0, tuple(against[:SHOWN]), said, rooms, found.pairs)
+
+
+def _perceived_in(script: LoadedScenario, effort: Effort) -> tuple[int, PerceptionResult]:
+    """In how many rooms it is known what the script acts on: in a few of them, and in all if there is time.
+
+    Raises:
+        OutOfTimeError: there was no time for the few.
+    """
+    rooms = max(1, effort.rooms // _PORTIONS)
+    found = perceived(script, rooms, effort.seed)
+    with suppress(OutOfTimeError):
+        rooms, found = effort.rooms, perceived(script, effort.rooms, effort.seed)
+    return rooms, found
 
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:

@@ -133,7 +133,9 @@ class ScenarioReport:
             if self.depth.alone is not None:
                 counts.append(("success without NPCs", self.depth.alone.rooms))
         short = [
-            (what, count) for what, count in counts if count < self.rooms and not self._is_for_nothing(what)
+            (what, count)
+            for what, count in counts
+            if count < self.rooms and (count > 0 or not self._is_for_nothing(what))
         ]
         if short:
             listed = ", ".join(f"{count} for {what}" for what, count in short)
