@@ -234,6 +234,9 @@ def _keep_alone(name: str, keys: dict[str, Node], bag: DiagnosticBag) -> None:
         if key in keys and isinstance(keys[key].children, list):
             message = f"a list gives one `{key}` to each of a group; `{name}` is only one"
             hint = None if name == _AGENT else "a group has a `count`; alternatives are drawn by pick(a | b)"
+            data = keys[key].data
+            if key == "place" and isinstance(data, list) and len(data) == 2:
+                hint = f"a cell is `at: [{data[0]}, {data[1]}]`"
             bag.error("S104", message, keys.pop(key).value_span(), hint=hint)
 
 

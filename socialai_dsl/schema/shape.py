@@ -144,6 +144,13 @@ def _report_nothing(key: str | int, part: Node, bag: DiagnosticBag) -> None:
 # -- keys that stand one level too far left or right ---------------------------------------------------------
 
 
+_MEANT: Final = {
+    "if": "when", "condition": "when", "while": "until", "wait": "for", "duration": "for", "act": "do", "action": "do",
+    "activity": "do", "next": "goto", "effect": "cause", "says": "say", "hear": "hears", "probability": "chance",
+    "position": "at", "location": "place", "where": "place",
+}  # fmt: skip
+"""What authors write for a key -> what it is called here."""
+
 _EXTENDS = "extends"
 """A key that is gone when the models see a file."""
 
@@ -490,7 +497,8 @@ class _Report:
             self._bag.error("S307", message, span)
             near = None
         else:
-            near = did_you_mean(key, known)
+            meant = _MEANT.get(key)
+            near = meant if meant in known else did_you_mean(key, known)
             if near is None and owner is Register:
                 near = self._left_over(finding.path[:-1], key, known)
             bound = near == "range" and owner is Register and ".." not in str(finding.value)

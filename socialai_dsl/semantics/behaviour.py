@@ -448,7 +448,8 @@ class _Planner:
             cure = "only what the frame declares in its own `let`, or the scenario in `state`, can be set"
             raise findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
         hint = f"declare it: `let: {{{name}: 0}}` in the frame"
-        advice = advice_on(name, [*self.played.model.let, *symbols.scenario.state], hint)
+        known = [*self.played.model.let, *symbols.scenario.state, *symbols.scenario.looks]
+        advice = advice_on(name, known, hint)
         raise findings.fail("S305", f"`{name}` is not declared in this frame's `let`", span, **advice)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:

@@ -631,7 +631,16 @@ class _Run:
                 f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, "
                 f"pointing_right and pointing_ahead, and carrying{more}"
             )
-            self._findings.error("S106", message, self._findings.places.key_span(("observe", "channels")))
+            path: DataPath = ("observe", "channels")
+            unknown = [name for name in given if name not in known]
+            if unknown:
+                span = self._findings.places.whole_span((*path, given.index(unknown[0])))
+                near = did_you_mean(unknown[0], known)
+                self._findings.error(
+                    "S106", f"`{unknown[0]}` is no channel", span, suggestion=near, hint=message
+                )
+            else:
+                self._findings.error("S106", message, self._findings.places.key_span(path))
         return len(plain)
 
     def _shows_carrying(self) -> bool:

@@ -494,6 +494,9 @@ def suggestion(
     near = did_you_mean(word, chain(declared, *_nearby(expected, scope))) or did_you_mean(
         word, [*RESERVED, *VALUES]
     )
+    few = expected is not None and expected.kind in ("look", "status") and near not in expected.words
+    if few and near in RESERVED:
+        near = None  # one of a few words is wanted, which are listed
     if near is None or near not in declared:
         return near, None
     kind = declared[near]
