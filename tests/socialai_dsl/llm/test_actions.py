@@ -1,7 +1,6 @@
 """What models really write is understood; what cannot be understood is answered with what is possible."""
 
 import json
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -178,9 +177,9 @@ def test_everything_that_can_be_done_and_said_is_read_back(name: str) -> None:
     program = sd.compile(sd.load(name))
     language = ActionLanguage(program)
     schema = jsonschema.Draft202012Validator(language.json_schema())
-    for template, noun in product(program.templates, program.nouns):
+    for template, choices in program.sentences.each():
         for movement in (None, "left"):
-            action = Action(movement, template.replace("<noun>", noun))
+            action = Action(movement, program.sentences.text(template, choices))
             assert language.parse(language.write(action)) == (action, "")
             reply = {"move": movement or "none", "say": action.sentence}
             schema.validate(reply)
