@@ -314,7 +314,7 @@ def _fold(word: str) -> str:
 
 
 def _nearness(word: str, candidate: str) -> int | None:
-    """TextEdit distance, or None if it is above the cut-off."""
+    """Edit distance, or None if it is above the cut-off."""
     longer, shorter = max(len(word), len(candidate)), min(len(word), len(candidate))
     cut_off = (longer + 2) // 4
     distance = _edit_distance(word, candidate, cut_off) if longer - shorter <= cut_off else cut_off + 1

@@ -3,7 +3,7 @@
 import argparse
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, Final, get_args, get_origin
@@ -184,13 +184,6 @@ def _cell(text: str) -> str:
 
 # -- words -------------------------------------------------------------------------------------------------------------
 
-_HEADINGS: Final = {
-    "value": "Conditions and values",
-    "place": "Places",
-    "activity": "Activities",
-    "effect": "Effects",
-}
-
 _SUBJECTS: Final = {
     "entity": "a.",
     "member": "n.",
@@ -208,7 +201,7 @@ _ARGUMENTS: Final = {
 
 
 def _words() -> Iterator[str]:
-    from socialai_dsl.semantics.words import SIGNATURES
+    from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUES
 
     yield "## Words\n"
     yield (
@@ -216,14 +209,19 @@ def _words() -> Iterator[str]:
         "a group, of which any one suffices. In a frame what stands before the dot may be left out, and is then the\n"
         "NPC itself.\n"
     )
-    for use, heading in _HEADINGS.items():
+    yield "### Conditions and values\n"
+    yield "| word | gives | meaning |\n|---|---|---|"
+    for value in VALUES.values():
+        yield f"| `{_written(value)}` | {value.gives} | {_cell(value.doc)} |"
+    yield ""
+    others: dict[str, Iterable[Signature]] = {
+        "Places": PLACES.values(), "Activities": ACTIVITIES.values(), "Effects": EFFECTS.values(),
+    }  # fmt: skip
+    for heading, words in others.items():
         yield f"### {heading}\n"
-        gives = use == "value"
-        yield "| word | gives | meaning |\n|---|---|---|" if gives else "| word | meaning |\n|---|---|"
-        for one in SIGNATURES:
-            if one.use == use:
-                middle = f" {one.gives} |" if gives else ""
-                yield f"| `{_written(one)}` |{middle} {_cell(one.doc)} |"
+        yield "| word | meaning |\n|---|---|"
+        for word in words:
+            yield f"| `{_written(word)}` | {_cell(word.doc)} |"
         yield ""
 
 

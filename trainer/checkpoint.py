@@ -47,7 +47,7 @@ class CheckpointMeta(BaseModel):
 
     format: Literal[2] = 2
     config: RunConfig
-    action_sizes: tuple[int, ...] = Field(min_length=4, max_length=16)
+    action_sizes: tuple[int, ...] = Field(min_length=3, max_length=16)
     image_shape: tuple[int, int, int]
     vocabulary: list[str] = Field(max_length=100_000)
     program_sha256: str = Field(max_length=64)

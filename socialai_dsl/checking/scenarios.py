@@ -396,7 +396,8 @@ def with_findings_on_rivals(
     is judged without it, and a rival by itself.
     """
     bag, idle = DiagnosticBag(), {d for d in found if d.code in _OF_ALL_VARIANTS}
-    own_frame = scenario.members()["agent"].frame if "agent" in scenario.members() else None
+    agent = scenario.members().get(_AGENT)
+    own_frame = agent.frame if agent is not None else None
     judged = {d for d in idle if own_frame and _is_in(resolved.tree.get(("frames", own_frame)), d.span)}
     for name, rival in scenario.rivals.items():
         own = DiagnosticBag()

@@ -48,21 +48,19 @@ def encode_action(
     Raises:
         ValueError: what was given is none of these; the message says what was got and what was expected.
     """
-    names = ", ".join(slot.name for slot in sentences.slots)
+    parts = ", ".join(["body action", "template", *(slot.name for slot in sentences.slots)])
     if (
         isinstance(action, str)
         or not isinstance(action, Sequence | np.ndarray)
         or len(action) not in (2, 2 + len(sentences.slots))
     ):
-        forms = (
-            f"(body action, template, {names}) or (body action, sentence), each part a word, a number or None"
-        )
+        forms = f"({parts}) or (body action, sentence), each part a word, a number or None"
         raise ValueError(f"got the action {action!r}; expected {forms}")
     meant = live or (frozenset(),) * (1 + len(sentences.slots))
     primitive = len(actions) if action[0] is None else _index(action[0], actions, "body action")
     if action[1] is None and all(word is None for word in action[2:]):
         return np.array([primitive, 0, 0, *(0 for _ in sentences.slots)], np.int64)
-    if len(action) == 2:
+    if len(action) == 2 and (sentences.slots or isinstance(action[1], str)):
         return np.array([primitive, 1, *_sentence(action[1], sentences, meant)], np.int64)
     if action[1] is None:
         words = " and ".join(

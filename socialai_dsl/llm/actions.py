@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from heapq import nlargest
 from itertools import dropwhile, islice
@@ -146,15 +146,23 @@ class ActionLanguage:
         lines += [f"- {action}: {_MEANINGS[action]}" for action in self._actions[:-1]]
         lines += [f"- {_STANDING}: stay as you are"]
         if self._sentences:
-            places = _listed(
-                [f"one of these nouns for <{NOUN}>" if n == NOUN else f"<{n}>" for n in self._slots]
-            )
-            filled = places if [*self._slots] == [NOUN] else f"one of these words for each {places} in it"
-            lines += ["", f"A sentence is one of these templates with {filled}."]
-            lines += [f"Templates: {'; '.join(map(printable, self._templates))}"]
-            for name, known in self._slots.items():
-                lines += [f"{'Nouns' if name == NOUN else f'<{name}>'}: {'; '.join(map(printable, known))}"]
+            lines += ["", *self._what_can_be_said()]
         return "\n".join([*lines, "", *self._how_to_reply(mode)])
+
+    def _what_can_be_said(self) -> Iterator[str]:
+        """Templates and what stands in their slots, as instructions."""
+        templates = "; ".join(map(printable, self._templates))
+        if not self._slots:
+            yield f"Sentences: {templates}"
+            return
+        if [*self._slots] == [NOUN]:
+            filled = f"one of these nouns for <{NOUN}>"
+        else:
+            filled = f"one of these words for each {_listed([f'<{name}>' for name in self._slots])} in it"
+        yield f"A sentence is one of these templates with {filled}."
+        yield f"Templates: {templates}"
+        for name, known in self._slots.items():
+            yield f"{'Nouns' if name == NOUN else f'<{name}>'}: {'; '.join(map(printable, known))}"
 
     def write(self, action: Action) -> str:
         """The action as a reply in the mode `text`; `parse` reads it back."""
@@ -249,6 +257,8 @@ class ActionLanguage:
                 tools.append(_tool("say", about, spoken | fillers, both))
             else:
                 about = "Say a template with a word for each of the slots <...> that it has."
+                if not fillers:
+                    about = "Say a sentence."
                 tools.append(_tool("say", about, spoken, fillers | both))
         return tools
 
@@ -404,6 +414,8 @@ class ActionLanguage:
         """Say what was wrong, and what is possible."""
         fillers = "one of the nouns" if [*self._slots] == [NOUN] else "words in place of <...>"
         sayable = f", and sentences are the templates with {fillers}" if self._sentences else ""
+        if self._sentences and not self._slots:
+            sayable = f", and sentences are {', '.join(map(printable, self._templates))}"
         return Parsed(None, f"{what}. Movements are {', '.join(self._actions)}{sayable}.")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, cast
+from typing import Any, cast
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
@@ -63,9 +63,6 @@ from socialai_dsl.semantics.words.effects import Caused
 from socialai_dsl.source import DataPath
 from socialai_dsl.widths import LARGEST_NUMBER
 
-_ABOUT_SOMETHING: Final = {"toggle": "use", "pickup": "fetch"}
-"""The activities that do with something what a body action does with what is ahead."""
-
 
 def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) -> Activity:
     """The body action of a state, step or rule; without one it stays."""
@@ -80,8 +77,12 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         raise _unknown(resolver, name, args, node, scope)
     if len(args) != len(word.takes):
         hint = None
-        if (meant := _ABOUT_SOMETHING.get(name)) is not None and len(args) == 1:
-            hint = resolver.instead(f"{meant}({quoted(args[0])})", node, scope, "which goes there, too")
+        # What does with something what this body action does with what is ahead.
+        meant = next(
+            (other for other in ACTIVITIES.values() if other.act == name and len(other.takes) == 1), None
+        )
+        if meant is not None and len(args) == 1:
+            hint = resolver.instead(f"{meant.name}({quoted(args[0])})", node, scope, "which goes there, too")
         raise resolver.fail("S211", wrong_count(word, len(args)), node, scope, hint=hint)
     own = scope.member == AGENT and not (scope.frame is not None and scope.frame.looked_at)
     if word.arm is not None and own:

@@ -489,7 +489,7 @@ class _Run:
 
     def _grammar_is_whole(self) -> bool:
         """Whether it can be known what the agent can say; mistakes are reported."""
-        if not possible.check_grammar(self._scenario, self._findings):
+        if not possible.check_grammar(self._scenario.grammar, self._findings):
             return False
         slots = self._scenario.grammar.slots
         if len(self._symbols.slots) < len(slots):

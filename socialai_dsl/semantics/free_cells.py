@@ -203,7 +203,7 @@ def _report(
         if not before and rects and len(rects) == len(placing.regions):
             with suppress(UnknownError):
                 if not any(interior_cells(region, size) for region in rects):
-                    hint = f"{_sizes_of(checked)}"
+                    hint = _sizes_of(checked)
         if not before and checked.room.build and any(region.name in EXACT for region in placing.regions):
             hint = "with `overlap: true` it can stand where the room builds something"
         report = findings.warning if before else findings.error

@@ -13,7 +13,7 @@ from typing import Final
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar.ast import Not, every, unparse
-from socialai_dsl.schema.scenario import Frame, Scenario, State, Step
+from socialai_dsl.schema.scenario import Frame, Scenario, State, Step, UtteranceGrammar
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of, surviving
@@ -50,11 +50,10 @@ MOST_PAIRS: Final = 64 * 256
 """The most numbers a grammar can have for what is said: templates times fillings."""
 
 
-def check_grammar(scenario: Scenario, findings: Findings) -> bool:
+def check_grammar(grammar: UtteranceGrammar, findings: Findings) -> bool:
     """Templates with something else than slots to fill, and anything that is in the grammar twice; False if the grammar
     has nothing to fill templates with.
     """
-    grammar = scenario.grammar
     span = findings.places.key_span(("grammar",))
     if grammar.nouns and grammar.slots:
         hint = "`nouns` are what `<noun>` can be; `slots` have names of their own"

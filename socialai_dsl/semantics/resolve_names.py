@@ -13,7 +13,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
 from socialai_dsl.semantics import object_facts, rows, slots, texts
 from socialai_dsl.semantics.groups import check_moment, must_be_agent, subject_of
-from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver, text_value
+from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
@@ -27,7 +27,6 @@ from socialai_dsl.semantics.scope import (
     drawn,
     of_each,
     quoted,
-    select,
     usage,
     words_of,
 )
@@ -67,7 +66,7 @@ def without_arguments(
     """`subject.name` or `subject.name()`: an attribute, a condition, or a status."""
     assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
     if name in resolver.symbols.slots:
-        check_moment(resolver, Signature(name, "agent", (), "noun", "", momentary=True), node, scope)
+        check_moment(resolver, Signature(name, "agent", momentary=True), node, scope)
         must_be_agent(resolver, node, scope)
         return _in_slot(resolver, name, heard=False)
     word = VALUES.get(name)
@@ -76,7 +75,7 @@ def without_arguments(
         return word.meaning(Use(resolver, word, node, subject, (), None, scope))
     if name not in _statuses(resolver):
         raise _unknown_attribute(resolver, name, word, node, scope)
-    status = Signature(name, "object", (), "condition", "")
+    status = Signature(name, "object")
     who = subject_of(resolver, subject, status, node, scope)
     assert who is not None, "internal: the candidate cell has no status"
     return has_status(resolver, name, who, node, scope)
@@ -220,25 +219,21 @@ def _substituted(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     if frame.model.slots[node.id] == "bool":
         return member_truth(resolver, frame, node.id, scope)
     if frame.model.slots[node.id] == "text":
-        return _member_text(resolver, frame, node, scope)
+        return _member_text(resolver, node, scope)
     message = f"`{node.id}` is an utterance: it can be said or heard, not computed with"
     raise resolver.fail("S204", message, node, scope)
 
 
-def _member_text(resolver: Resolver, frame: PlayedFrame, node: ast.Name, scope: Scope) -> Term:
+def _member_text(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """The text that fills a slot, in the file that was drawn if there are several; with `<...>` it can only be said."""
-    paths = frame.texts[node.id]
-    if paths is None:
-        raise FailedError  # nobody fills it, which is reported where it is left empty
-    texts_ = [str(resolver.findings.part(path)) for path in paths]
-    if not all(
-        resolver.findings.text(path, text).plain is not None for path, text in zip(paths, texts_, strict=True)
-    ):
+    slot = texts.text_slot(resolver, node, scope)
+    assert slot is not None, "internal: a slot of type text"
+    if any(filling.text.plain is None for filling in slot):
         message = (
             f"`{node.id}` is filled with a text that has <...>: it can be said or heard, not computed with"
         )
         raise resolver.fail("S204", message, node, scope)
-    return select(resolver.registers.drawn_file(frame.member), [text_value(text) for text in texts_])
+    return texts.plain_text(resolver, slot)
 
 
 def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope) -> Term:

@@ -557,6 +557,7 @@ class Resolver(ABC):
         readings: how everything was written that has been given a meaning.
         used: where the definitions and draws stand that something uses.
         missing_keys: table and word of what may be looked up and is not there, once it has been reported.
+        reported: other mistakes that are reported once, by a name of their own.
         slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
         addresses: whether the agent or an NPC addresses a single hearer.
         tables, links, moved_inside: what `tables` and `object_facts` have found out already.

@@ -23,7 +23,6 @@ Argument = Literal[
     "sequence",
 ]
 Subject = Literal["entity", "member", "agent", "object", "cell", "none"]
-Use = Literal["value", "place", "activity", "effect"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +33,8 @@ class Signature:
         name: the word.
         subject: what stands before the dot; in a frame it may be left out and is then the NPC itself.
         takes: its arguments; `entities` is one or a group, of which any one suffices.
-        gives: what it is, in words.
+        gives: what a condition or value is, in words.
         doc: one line for the reference.
-        use: where it may stand.
         momentary: it speaks of the current step, so it means nothing before the first.
         candidate: the candidate cell of a place, `here`, may be its subject as a place that is asked for.
         cell: a cell may be its subject.
@@ -45,11 +43,10 @@ class Signature:
     """
 
     name: str
-    subject: Subject
-    takes: tuple[Argument, ...]
-    gives: str
-    doc: str
-    use: Use = "value"
+    subject: Subject = "none"
+    takes: tuple[Argument, ...] = ()
+    gives: str = ""
+    doc: str = ""
     momentary: bool = False
     candidate: bool = False
     cell: bool = False

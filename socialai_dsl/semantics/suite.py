@@ -10,7 +10,9 @@ from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.semantics.possible import check_grammar
 from socialai_dsl.semantics.resolver import texts_of
+from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Pattern
 from socialai_dsl.source import Node
 from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
@@ -63,10 +65,8 @@ def shared_space(
     _check_looks(names, members, places, bag)
     own = [member.sentences for member in members]
     written = None if isinstance(suite.grammar, str) else suite.grammar
-    if written is not None and written.nouns and written.slots:
-        bag.error("S107", "`grammar` has either `nouns` or `slots`", places.key_span(("grammar",)))
-    elif written is not None and not written.nouns and any("<noun>" in one for one in written.templates):
-        bag.error("S105", "`grammar` needs a key `nouns`", places.key_span(("grammar",)))
+    if written is not None:
+        check_grammar(written, Findings(bag, places))
     templates, template_maps = _shared(
         suite.grammar, written.templates if written else (), [one.templates for one in own]
     )

@@ -14,7 +14,15 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
-from socialai_dsl.semantics.resolver import INT, MAX_TEXTS, SAYABLE, Resolver, texts_of, words_of_values
+from socialai_dsl.semantics.resolver import (
+    INT,
+    MAX_TEXTS,
+    SAYABLE,
+    Resolver,
+    text_value,
+    texts_of,
+    words_of_values,
+)
 from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
@@ -75,7 +83,7 @@ def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
 def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     """Whether the NPC whose frame it is heard one of the texts at `node`, or `any`, since its last turn."""
     if isinstance(node, ast.Name) and node.id == ANYTHING:
-        found = for_ears(resolver, [(resolver.utterances.anything(), None)], scope)
+        found = heard_at(resolver, ANYTHING, scope)
         return any_of(all_of([Heard((pattern,)), *_given(given)]) for pattern, given in found)
     return any_of(
         all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
@@ -88,7 +96,7 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
     """The texts that an argument names, each with the condition on what `one_of` drew and where it is written."""
     found: list[tuple[ast.Text, Term | None, Span]] = []
     for option in ast.options_of(node):
-        slot = _slot(resolver, option, scope)
+        slot = text_slot(resolver, option, scope)
         if slot is not None:
             places = resolver.findings.places
             found += [(one.text, one.drawn, places.whole_span(one.path)) for one in slot]
@@ -108,7 +116,7 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
     return found
 
 
-def _slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[_Filling] | None:
+def text_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[Filling] | None:
     """What fills the slot of type text or utterance that an expression names, `<formula>` of one's own frame or
     `<teacher.formula>` of a member's: one text, or several where the files of a `one_of` differ. None if it names
     no such slot.
@@ -128,7 +136,7 @@ def _slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[_Filling] | 
         raise FailedError  # nobody fills it, which is reported where it is left empty
     described = resolver.symbols.alternatives[frame.member]
     return [
-        _Filling(
+        Filling(
             frame.member,
             name,
             paths[numbers[0]],
@@ -205,7 +213,7 @@ def _spliced(
     choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None, Span | None]]] = []
     findings = resolver.findings
     for part in text.parts:
-        slot = None if isinstance(part, str) else _slot(resolver, part, scope)
+        slot = None if isinstance(part, str) else text_slot(resolver, part, scope)
         if slot is None:
             choices.append([((part,), None, None)])
             continue
@@ -318,7 +326,7 @@ def _line(resolver: Resolver, path: DataPath, text: ast.Text, scope: Scope) -> L
     span = resolver.findings.places.whole_span(path)
     _check_is_meant(resolver, path, text, span)
     only = text.parts[0] if len(text.parts) == 1 else None
-    slot = _slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
+    slot = text_slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
     if slot is not None and len(slot) == 1:
         # All of it is the slot's value, so its picks are drawn at the slot's site.
         text, scope = slot[0].text, replace(slot[0].scope(scope), outer=None)
@@ -353,7 +361,7 @@ def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
     for part in text.parts:
         if isinstance(part, str):
             found.append(part)
-        elif (slot := _slot(resolver, part, scope)) is not None:
+        elif (slot := text_slot(resolver, part, scope)) is not None:
             found += _filled(resolver, slot, scope)
         else:
             term = sayable(resolver, part, scope)
@@ -361,7 +369,7 @@ def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
     return found
 
 
-def _filled(resolver: Resolver, slot: list[_Filling], scope: Scope) -> list[str | Term]:
+def _filled(resolver: Resolver, slot: list[Filling], scope: Scope) -> list[str | Term]:
     """What a slot contributes to a line; where files that `one_of` draws differ, one value with their texts."""
     if len(slot) == 1:
         return parts(resolver, slot[0].text, slot[0].scope(scope))
@@ -374,11 +382,14 @@ def _filled(resolver: Resolver, slot: list[_Filling], scope: Scope) -> list[str 
             resolver.findings.at(values.path),
             hint="put what differs into a slot of its own",
         )
-    plain = [
-        Const(Type("text", 0, 0, (str(one.with_[slot[0].slot]),)), 0)
-        for one in resolver.symbols.alternatives[slot[0].member]
-    ]
-    return [select(resolver.registers.drawn_file(slot[0].member), plain)]
+    return [plain_text(resolver, slot)]
+
+
+def plain_text(resolver: Resolver, slot: list[Filling]) -> Term:
+    """What fills a slot without values in it: the text of the file that was drawn."""
+    member, name = slot[0].member, slot[0].slot
+    texts_ = [text_value(str(one.with_[name])) for one in resolver.symbols.alternatives[member]]
+    return select(resolver.registers.drawn_file(member), texts_)
 
 
 def _agents(resolver: Resolver, line: Line) -> Line:
@@ -414,7 +425,7 @@ def _may_change(resolver: Resolver, value: Term) -> bool:
 
 
 @dataclass(frozen=True)
-class _Filling:
+class Filling:
     """A text that fills a slot of a member's frame; `drawn` is the condition that it is this one of several."""
 
     member: str

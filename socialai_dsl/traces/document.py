@@ -130,7 +130,8 @@ class Moment(_Part):
         marks, view_marks: pairs of a cell and the number of the looks of what is seen there; where the agent stands, of
             what it carries.
         state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
-        action: body action, speak, template, then the noun or a number for each slot; None without a step.
+        action: body action, speak, template, then the noun or a number for each slot, if there are any; None without a
+            step.
         did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
         reward: of the step.
@@ -155,7 +156,7 @@ class Moment(_Part):
     marks: list[tuple[_Number, _Number]] = []
     view_marks: list[tuple[_Number, _Number]] = []
     state: dict[str, Any] = {}
-    action: Annotated[tuple[_Number, ...], Field(min_length=4)] | None = None
+    action: Annotated[tuple[_Number, ...], Field(min_length=3)] | None = None
     did: str | None = None
     said: str | None = None
     heard: list[Line] = []

@@ -53,13 +53,13 @@ class NetSpec:
         """The sizes of an environment, single or vector.
 
         Raises:
-            ValueError: the spaces are not a `MultiDiscrete` of four or more and a `Dict` of `image` and `tokens`, or do
-                not fit the program's words.
+            ValueError: the spaces are not a `MultiDiscrete` of at least three and a `Dict` of `image` and `tokens`, or
+                do not fit the program's words.
         """
         actions = getattr(envs, "single_action_space", envs.action_space)
-        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) < 4 or actions.nvec[1] != 2:
+        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) < 3 or actions.nvec[1] != 2:
             raise ValueError(
-                f"action space: got {actions}, expected MultiDiscrete([bodies, 2, templates, words, ...])"
+                f"action space: got {actions}, expected MultiDiscrete([bodies, 2, templates, ...])"
             )
         observations = getattr(envs, "single_observation_space", envs.observation_space)
         parts = observations.spaces if isinstance(observations, spaces.Dict) else {}

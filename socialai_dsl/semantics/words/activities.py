@@ -13,7 +13,7 @@ from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.plans import Activity
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import FailedError, Macro, Scope, quoted, with_article
-from socialai_dsl.semantics.signatures import Argument, Signature
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -78,6 +78,21 @@ class Doing:
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 
 
+_TYPES: Final[Mapping[str, Type]] = {"direction": DIRECTION, "turn": TURN, "int": INT}
+"""What is expected of an argument, by what the word takes."""
+
+
+def _plain(doing: Doing) -> Activity:
+    """An activity of the arguments that it takes."""
+    terms = [
+        doing.one(place)
+        if takes == "entity"
+        else doing.resolver.value(doing.args[place], _TYPES[takes], doing.scope)
+        for place, takes in enumerate(doing.word.takes)
+    ]
+    return doing.activity(*terms)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deed(Signature):
     """A word for an activity.
@@ -93,7 +108,7 @@ class Deed(Signature):
         arm: what becomes of an arm that points, which the agent lacks: it points, or it is taken down.
     """
 
-    meaning: Callable[[Doing], Activity]
+    meaning: Callable[[Doing], Activity] = _plain
     moves: Moves = "walks"
     endless: bool = False
     handles: tuple[Primitive, ...] = ()
@@ -116,19 +131,6 @@ class Deed(Signature):
 
 
 _MOVES: Final = {"walks": ("left", "right", "forward"), "turns": ("left", "right"), "stays": ()}
-_TYPES: Final[Mapping[str, Type]] = {"direction": DIRECTION, "turn": TURN, "int": INT}
-"""What is expected of an argument, by what the word takes."""
-
-
-def _plain(doing: Doing) -> Activity:
-    """An activity of the arguments that it takes."""
-    terms = [
-        doing.one(place)
-        if takes == "entity"
-        else doing.resolver.value(doing.args[place], _TYPES[takes], doing.scope)
-        for place, takes in enumerate(doing.word.takes)
-    ]
-    return doing.activity(*terms)
 
 
 def _to_a_place(doing: Doing) -> Activity:
@@ -199,16 +201,28 @@ def _perform(doing: Doing) -> Activity:
 
 
 def _choose(doing: Doing) -> Activity:
-    return _choice(doing, doing.args[0])
+    (node,) = doing.args
+    ordinal = doing.scope.draws.number()
+    members = groups.group(doing.resolver, _with_stay(node), ACTION, doing.scope)
+    if members.type != ACTION:
+        message = f"`{quoted(node)}` are not actions; write choose(forward | left)"
+        raise doing.fail("S204", message, node)
+    weights = {item: members.items.count(item) for item in members.items}
+    chosen = doing.activity(*weights)
+    return replace(chosen, weights=tuple(weights.values()), ordinal=ordinal)
 
 
-def _wander(doing: Doing) -> Activity:
-    return _choice(doing, parse_expression("forward | left | right"))
+def _with_stay(node: ast.Expr) -> ast.Expr:
+    """`stay` among the options is the action `none`: the word that stands alone in a `do:` may stand here too."""
+    if isinstance(node, ast.Alternatives):
+        return replace(node, options=tuple(map(_with_stay, node.options)))
+    return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
 
 
-def _composed(parameters: str, does: str, until: str) -> Callable[[Doing], Activity]:
-    """An activity that is another one until a condition holds, both written in the language."""
-    named, deed, ends = parameters.split(), parse_expression(does), parse_expression(until)
+def _composed(parameters: str, does: str, until: str | None = None) -> Callable[[Doing], Activity]:
+    """An activity that is another one, until a condition holds if there is one, both written in the language."""
+    named, deed = parameters.split(), parse_expression(does)
+    ends = parse_expression(until) if until is not None else None
     assert isinstance(deed, ast.Call), "internal: an activity with arguments"
 
     def meaning(doing: Doing) -> Activity:
@@ -224,92 +238,54 @@ def _composed(parameters: str, does: str, until: str) -> Callable[[Doing], Activ
                 f"`{doing.word.name}` asks in every turn what it is about, so nothing can be drawn in it"
             )
             raise doing.fail("S204", message, hint="draw it in `let`, and use that")
-        return replace(done, until=doing.resolver.value(ends, BOOL, inner))
+        return done if ends is None else replace(done, until=doing.resolver.value(ends, BOOL, inner))
 
     return meaning
 
 
-def _choice(doing: Doing, node: ast.Expr) -> Activity:
-    ordinal = doing.scope.draws.number()
-    members = groups.group(doing.resolver, _with_stay(node), ACTION, doing.scope)
-    if members.type != ACTION:
-        message = f"`{quoted(node)}` are not actions; write choose(forward | left)"
-        raise doing.fail("S204", message, node)
-    weights = {item: members.items.count(item) for item in members.items}
-    chosen = doing.activity(*weights, name="choose")
-    return replace(chosen, weights=tuple(weights.values()), ordinal=ordinal)
-
-
-def _with_stay(node: ast.Expr) -> ast.Expr:
-    """`stay` among the options is the action `none`: the word that stands alone in a `do:` may stand here too."""
-    if isinstance(node, ast.Alternatives):
-        return replace(node, options=tuple(map(_with_stay, node.options)))
-    return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
-
-
-def _deed(
-    name: str,
-    takes: tuple[Argument, ...],
-    doc: str,
-    *,
-    moves: Moves = "walks",
-    endless: bool = False,
-    handles: tuple[Primitive, ...] = (),
-    goes: Literal["there", "beside"] | None = None,
-    act: Primitive | None = None,
-    lapses: bool = False,
-    arm: Literal["points", "rests"] | None = None,
-    also: tuple[str, ...] = (),
-    meaning: Callable[[Doing], Activity] = _plain,
-) -> Deed:
-    return Deed(
-        name, "none", takes, "activity", doc, "activity", moves=moves, endless=endless, handles=handles, goes=goes,
-        act=act, lapses=lapses, arm=arm, also=also, meaning=meaning,
-    )  # fmt: skip
-
-
 ACTIVITIES: Final = (
-    _deed("stay", (), "do nothing", moves="stays", endless=True, also=("wait", "nothing", "none", "idle")),
-    _deed("left", (), "a quarter turn left", moves="turns"),
-    _deed("right", (), "a quarter turn right", moves="turns"),
-    _deed("forward", (), "one cell ahead"),
-    _deed("toggle", (), "use what is ahead", moves="stays"),
-    _deed("pickup", (), "take what is ahead into its hands", moves="stays", also=("pick_up",)),
-    _deed("drop", (), "lay down ahead what it carries, or give it to the member that stands there", moves="stays",
-          also=("put_down", "lay_down")),
-    _deed("face", ("entity",), "turn towards x, a quarter turn a step", moves="turns", endless=True,
-          also=("look", "look_at", "watch", "gaze"), meaning=_to_a_place),
-    _deed("turn_to", ("direction",), "turn to a direction, a quarter turn a step", moves="turns"),
-    _deed("turn", ("turn",), "a quarter turn left or right", moves="turns", also=("rotate",)),
-    _deed("go_to", ("entity",), "walk to the cell of x", goes="there", lapses=True,
-          also=("walk", "walk_to", "go", "move_to", "move", "goto"), meaning=_to_a_place),
-    _deed("go_next_to", ("entity",), "walk to a cell next to x", goes="beside", lapses=True,
-          also=("approach", "come_to"), meaning=_to_a_place),
-    _deed("use", ("entity",), "go next to x, face it, toggle it", handles=("toggle",), goes="beside", act="toggle",
-          also=("press", "push_button", "open", "pick", "activate", "interact")),
-    _deed("fetch", ("entity",), "go next to x, face it, pick it up", handles=("pickup",), act="pickup",
-          also=("take", "grab", "get"), meaning=_of_hands),
-    _deed("give", ("entity", "entity"), "go next to y and hand over x, if it carries x", handles=("drop",), act="drop",
-          also=("hand", "hand_over"), meaning=_of_hands),
-    _deed("bring", ("entity", "entity"), "fetch x, then give it to y, or lay it down on the cell of y",
-          handles=("pickup", "drop"), act="drop", also=("carry", "deliver"), meaning=_of_hands),
-    _deed("search", ("entities",), "look around, then walk about, until it sees x", lapses=True,
-          also=("look_for", "find", "explore", "seek", "look_around"), meaning=_search),
-    _deed("enter", ("entity",), "open x if it is closed, then go in", handles=("toggle",), goes="there", lapses=True,
-          also=("go_through", "exit"), meaning=_enter),
-    _deed("push", ("entity", "direction"), "go behind x and push it that way", act="forward", meaning=_push),
-    _deed("point", ("entity",), "point the way x lies", moves="stays", arm="points", meaning=_point),
-    _deed("point_at", ("entity",), "point at the cell of x, in any direction", moves="stays", arm="points",
-          also=("points_at", "point_to"), meaning=_point_at),
-    _deed("stop_pointing", (), "take the arm down", moves="stays", arm="rests"),
-    _deed("follow", ("entity",), "walk next to x, again and again", endless=True, meaning=_follow),
-    _deed("stay_near", ("entity", "int"), "walk towards x while it is more than n cells away", endless=True),
-    _deed("flee", ("entity",), "turn away from x and walk", endless=True),
-    _deed("go_away_from", ("entity", "int"), "turn away from x and walk, until x is n cells away", lapses=True,
-          also=("go_away", "leave", "avoid", "keep_away_from", "get_away_from", "walk_away_from"),
-          meaning=_composed("x n", does="flee(x)", until="distance(x) >= n")),
-    _deed("perform", ("sequence",), "one act of a sequence a turn, words included", also=("dance", "repeat"),
-          meaning=_perform),
-    _deed("choose", ("actions",), "one at random: choose(a | b | 2 * c)", endless=True, meaning=_choose),
-    _deed("wander", (), "choose(forward | left | right)", endless=True, also=("random",), meaning=_wander),
+    Deed("stay", doc="do nothing", moves="stays", endless=True, also=("wait", "nothing", "none", "idle")),
+    Deed("left", doc="a quarter turn left", moves="turns"),
+    Deed("right", doc="a quarter turn right", moves="turns"),
+    Deed("forward", doc="one cell ahead"),
+    Deed("toggle", doc="use what is ahead", moves="stays"),
+    Deed("pickup", doc="take what is ahead into its hands", moves="stays", also=("pick_up",)),
+    Deed("drop", doc="lay down ahead what it carries, or give it to the member that stands there", moves="stays",
+         also=("put_down", "lay_down")),
+    Deed("face", takes=("entity",), doc="turn towards x, a quarter turn a step", moves="turns", endless=True,
+         also=("look", "look_at", "watch", "gaze"), meaning=_to_a_place),
+    Deed("turn_to", takes=("direction",), doc="turn to a direction, a quarter turn a step", moves="turns"),
+    Deed("turn", takes=("turn",), doc="a quarter turn left or right", moves="turns", also=("rotate",)),
+    Deed("go_to", takes=("entity",), doc="walk to the cell of x", goes="there", lapses=True,
+         also=("walk", "walk_to", "go", "move_to", "move", "goto"), meaning=_to_a_place),
+    Deed("go_next_to", takes=("entity",), doc="walk to a cell next to x", goes="beside", lapses=True,
+         also=("approach", "come_to"), meaning=_to_a_place),
+    Deed("use", takes=("entity",), doc="go next to x, face it, toggle it", handles=("toggle",), goes="beside",
+         act="toggle", also=("press", "push_button", "open", "pick", "activate", "interact")),
+    Deed("fetch", takes=("entity",), doc="go next to x, face it, pick it up", handles=("pickup",), act="pickup",
+         also=("take", "grab", "get"), meaning=_of_hands),
+    Deed("give", takes=("entity", "entity"), doc="go next to y and hand over x, if it carries x", handles=("drop",),
+         act="drop", also=("hand", "hand_over"), meaning=_of_hands),
+    Deed("bring", takes=("entity", "entity"), doc="fetch x, then give it to y, or lay it down on the cell of y",
+         handles=("pickup", "drop"), act="drop", also=("carry", "deliver"), meaning=_of_hands),
+    Deed("search", takes=("entities",), doc="look around, then walk about, until it sees x", lapses=True,
+         also=("look_for", "find", "explore", "seek", "look_around"), meaning=_search),
+    Deed("enter", takes=("entity",), doc="open x if it is closed, then go in", handles=("toggle",), goes="there",
+         lapses=True, also=("go_through", "exit"), meaning=_enter),
+    Deed("push", takes=("entity", "direction"), doc="go behind x and push it that way", act="forward", meaning=_push),
+    Deed("point", takes=("entity",), doc="point the way x lies", moves="stays", arm="points", meaning=_point),
+    Deed("point_at", takes=("entity",), doc="point at the cell of x, in any direction", moves="stays", arm="points",
+         also=("points_at", "point_to"), meaning=_point_at),
+    Deed("stop_pointing", doc="take the arm down", moves="stays", arm="rests"),
+    Deed("follow", takes=("entity",), doc="walk next to x, again and again", endless=True, meaning=_follow),
+    Deed("stay_near", takes=("entity", "int"), doc="walk towards x while it is more than n cells away", endless=True),
+    Deed("flee", takes=("entity",), doc="turn away from x and walk", endless=True),
+    Deed("go_away_from", takes=("entity", "int"), doc="turn away from x and walk, until x is n cells away", lapses=True,
+         also=("go_away", "leave", "avoid", "keep_away_from", "get_away_from", "walk_away_from"),
+         meaning=_composed("x n", does="flee(x)", until="distance(x) >= n")),
+    Deed("perform", takes=("sequence",), doc="one act of a sequence a turn, words included", also=("dance", "repeat"),
+         meaning=_perform),
+    Deed("choose", takes=("actions",), doc="one at random: choose(a | b | 2 * c)", endless=True, meaning=_choose),
+    Deed("wander", doc="choose(forward | left | right)", endless=True, also=("random",),
+         meaning=_composed("", does="choose(forward | left | right)")),
 )  # fmt: skip

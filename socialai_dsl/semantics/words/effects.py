@@ -10,7 +10,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import hands, object_facts
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import FailedError, Scope, quoted
-from socialai_dsl.semantics.signatures import Argument, Signature, Subject
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import Const, Term
 from socialai_dsl.semantics.words.statuses import status_of
 
@@ -37,6 +37,17 @@ class Caused:
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 
 
+def _status(caused: Caused) -> None:
+    """Whether the objects can have the status that it needs or leads to."""
+    fields = [status_of(caused.resolver, each, caused.node, caused.scope) for each in caused.entities]
+    words, wanted = fields[0].type.words, caused.word.makes or caused.word.needs
+    if wanted not in words:
+        message = (
+            f"`{caused.word.name}` cannot happen to `{quoted(caused.subject)}`: it is {' or '.join(words)}"
+        )
+        raise caused.fail("S204", message, hint="`x.become(status)` sets a status")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change(Signature):
     """A word for an effect.
@@ -48,7 +59,7 @@ class Change(Signature):
         takes_away: what it is about may leave the room. carries_off: it may come to lie on another cell.
     """
 
-    meaning: Callable[[Caused], Term | None]
+    meaning: Callable[[Caused], Term | None] = _status
     makes: str | None = None
     needs: str | None = None
     takes_away: bool = False
@@ -58,17 +69,6 @@ class Change(Signature):
     def sets_status(self) -> bool:
         """Whether what it is about may have another status afterwards."""
         return self.makes is not None or self.needs is not None or "status" in self.takes
-
-
-def _status(caused: Caused) -> None:
-    """Whether the objects can have the status that it needs or leads to."""
-    fields = [status_of(caused.resolver, each, caused.node, caused.scope) for each in caused.entities]
-    words, wanted = fields[0].type.words, caused.word.makes or caused.word.needs
-    if wanted not in words:
-        message = (
-            f"`{caused.word.name}` cannot happen to `{quoted(caused.subject)}`: it is {' or '.join(words)}"
-        )
-        raise caused.fail("S204", message, hint="`x.become(status)` sets a status")
 
 
 def _become(caused: Caused) -> Term:
@@ -117,35 +117,17 @@ def _move_into(caused: Caused) -> Term:
     return holder
 
 
-def _change(
-    name: str,
-    subject: Subject,
-    doc: str,
-    *,
-    takes: tuple[Argument, ...] = (),
-    makes: str | None = None,
-    needs: str | None = None,
-    takes_away: bool = False,
-    carries_off: bool = False,
-    meaning: Callable[[Caused], Term | None] = _status,
-) -> Change:
-    return Change(
-        name, subject, takes, "effect", doc, "effect", makes=makes, needs=needs, takes_away=takes_away,
-        carries_off=carries_off, meaning=meaning,
-    )  # fmt: skip
-
-
 EFFECTS: Final = (
-    _change("open", "object", "becomes open", makes="open"),
-    _change("close", "object", "becomes closed", makes="closed"),
-    _change("lock", "object", "becomes locked", makes="locked"),
-    _change("unlock", "object", "closed, if it was locked", needs="locked"),
-    _change("reset", "entity", "status, place and content as when the episode began", meaning=_reset),
-    _change("vanish", "entity", "leaves the room; it is `gone`", takes_away=True, meaning=_vanish),
-    _change("reveal", "object", "becomes opened", makes="opened"),
-    _change("put", "entity", "put(x): comes to the cell of x", takes=("entity",), takes_away=True, carries_off=True,
-            meaning=_put),
-    _change("move_into", "object", "move_into(x): lies in x, or is carried by x", takes=("entity",), takes_away=True,
-            carries_off=True, meaning=_move_into),
-    _change("become", "object", "takes this status", takes=("status",), meaning=_become),
+    Change("open", "object", doc="becomes open", makes="open"),
+    Change("close", "object", doc="becomes closed", makes="closed"),
+    Change("lock", "object", doc="becomes locked", makes="locked"),
+    Change("unlock", "object", doc="closed, if it was locked", needs="locked"),
+    Change("reset", "entity", doc="status, place and content as when the episode began", meaning=_reset),
+    Change("vanish", "entity", doc="leaves the room; it is `gone`", takes_away=True, meaning=_vanish),
+    Change("reveal", "object", doc="becomes opened", makes="opened"),
+    Change("put", "entity", doc="put(x): comes to the cell of x", takes=("entity",), takes_away=True, carries_off=True,
+           meaning=_put),
+    Change("move_into", "object", doc="move_into(x): lies in x, or is carried by x", takes=("entity",), takes_away=True,
+           carries_off=True, meaning=_move_into),
+    Change("become", "object", doc="takes this status", takes=("status",), meaning=_become),
 )  # fmt: skip

@@ -34,18 +34,17 @@ class Placed:
     count: int | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place(Signature):
-    """A word for a set of cells; `meaning` is the regions that a use of it stands for."""
-
-    meaning: Callable[[Placed], tuple[Region, ...]]
-    use: str = "place"  # type: ignore[assignment]
-
-
 def _known(placed: Placed) -> tuple[Region, ...]:
     """A region of numbers."""
     args = tuple(placed.resolver.value(arg, INT, placed.scope) for arg in placed.args)
     return (Region(cast(RegionName, placed.signature.name), args),)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place(Signature):
+    """A word for a set of cells; `meaning` is the regions that a use of it stands for."""
+
+    meaning: Callable[[Placed], tuple[Region, ...]] = _known
 
 
 def _rect(placed: Placed) -> tuple[Region, ...]:
@@ -95,23 +94,18 @@ def _each_wall(placed: Placed) -> tuple[Region, ...]:
     return (Region("wall", side=SIDES[placed.index], margin=margin.value),)
 
 
-def _half(name: str, doc: str) -> Place:
-    return Place(name, "none", (), "place", doc, meaning=_known)
-
-
 PLACES: Final = (
-    _half("anywhere", "all free cells of the room"),
-    Place("nowhere", "none", (), "place", "not in the room", meaning=lambda _: ()),
-    _half("left_half", "x < W // 2"),
-    _half("right_half", "x > W // 2"),
-    _half("top_half", "y < H // 2"),
-    _half("bottom_half", "y > H // 2"),
-    Place("column", "none", ("int",), "place", "the column x, without the walls", meaning=_known),
-    Place("row", "none", ("int",), "place", "the row y, without the walls", meaning=_known),
-    Place("rect", "none", ("int", "int", "int", "int"), "place", "from (x0, y0) to (x1, y1)", meaning=_rect),
-    Place("next_to", "none", ("entities",), "place", "one cell away from x", meaning=_about),
-    Place("in_front_of", "none", ("entities",), "place", "the cell before x", meaning=_about),
-    Place("wall", "none", ("side",), "place", "in this wall, not in its corners", meaning=_wall),
-    Place("each_wall", "none", ("int",), "place", "one in each wall, n off the corners", optional=1,
-          meaning=_each_wall),
+    Place("anywhere", doc="all free cells of the room"),
+    Place("nowhere", doc="not in the room", meaning=lambda _: ()),
+    Place("left_half", doc="x < W // 2"),
+    Place("right_half", doc="x > W // 2"),
+    Place("top_half", doc="y < H // 2"),
+    Place("bottom_half", doc="y > H // 2"),
+    Place("column", takes=("int",), doc="the column x, without the walls"),
+    Place("row", takes=("int",), doc="the row y, without the walls"),
+    Place("rect", takes=("int", "int", "int", "int"), doc="from (x0, y0) to (x1, y1)", meaning=_rect),
+    Place("next_to", takes=("entities",), doc="one cell away from x", meaning=_about),
+    Place("in_front_of", takes=("entities",), doc="the cell before x", meaning=_about),
+    Place("wall", takes=("side",), doc="in this wall, not in its corners", meaning=_wall),
+    Place("each_wall", takes=("int",), doc="one in each wall, n off the corners", optional=1, meaning=_each_wall),
 )  # fmt: skip

@@ -125,6 +125,31 @@ def test_what_is_wrong_is_said_where_it_is(text: str, findings: list[str]) -> No
     assert written(text) == findings
 
 
+@pytest.mark.parametrize(
+    "grammar",
+    [
+        "{templates: [Give me <noun>, Open <noun>, Open <what>], nouns: [bread]}",
+        "{templates: [Give me <noun>, Open <noun> or <noun>], nouns: [bread]}",
+        "{templates: [Give me <noun>, Open > <noun>], nouns: [bread]}",
+        "{templates: [Give me <noun>, give me <noun>], nouns: [bread]}",
+        "{templates: [Give me <noun>], nouns: [bread, Bread]}",
+        "{templates: [Give me <noun>], nouns: [bread, <noun>]}",
+        "{templates: [Give me <noun>], nouns: [bread], slots: {food: [bread, cake]}}",
+        "{templates: [Give me <noun>]}",
+    ],
+)
+def test_a_suites_grammar_is_judged_as_a_scenarios(grammar: str) -> None:
+    own = "grammar:\n  templates: [Give me <noun>, Open <noun>]\n  nouns: [bread, sesame, 2]\n"
+    right = Path("errands.yaml").read_text()
+    assert own in right
+    Path("alone.yaml").write_text(right.replace(own, f"grammar: {grammar}\n"))
+    found = [str(finding).removeprefix("alone.yaml:") for finding in check("alone.yaml").diagnostics]
+    of_the_grammar = [finding.removeprefix("7:") for finding in found if finding.startswith("7:")]
+    assert of_the_grammar
+    suites = written(f"grammar: {grammar}\nmembers: [errands]")
+    assert [finding.removeprefix("2:") for finding in suites] == of_the_grammar
+
+
 def test_mistakes_of_members_are_shown_in_their_files() -> None:
     right = Path("errands.yaml").read_text()
     Path("errands.yaml").write_text(right.replace("baker.is(gone)", "baker.is(gon)"))
