@@ -20,7 +20,6 @@ from gymnasium.wrappers import vector
 
 import socialai_dsl
 from socialai_dsl.loader.shipped import IDS
-from tests.quick import one_in
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "interop.md").read_text(encoding="utf-8")
@@ -84,7 +83,7 @@ BATCHES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", one_in(10, NAMES, "plays every scenario"))
+@pytest.mark.parametrize("name", NAMES)
 def test_wrappers_of_single_environments(name: str) -> None:
     for what, wrap in SINGLE.items():
         env = wrap(gym.make(name))
@@ -106,7 +105,7 @@ def test_wrappers_of_single_environments(name: str) -> None:
         env.close()
 
 
-@pytest.mark.parametrize("name", one_in(10, NAMES, "plays every scenario"))
+@pytest.mark.parametrize("name", NAMES)
 def test_wrappers_of_batches(name: str) -> None:
     for what, wrap in BATCHES.items():
         envs = wrap(gym.make_vec(name, num_envs=3))
@@ -129,7 +128,7 @@ def test_wrappers_of_batches(name: str) -> None:
 
 @pytest.mark.skipif(find_spec("moviepy") is None, reason="moviepy is not installed")
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("name", one_in(10, NAMES, "plays every scenario"))
+@pytest.mark.parametrize("name", NAMES)
 def test_videos(name: str, tmp_path: Path) -> None:
     env = wrappers.RecordVideo(
         gym.make(name, render_mode="rgb_array"), str(tmp_path / "video"), disable_logger=True

@@ -65,7 +65,7 @@ def believed(room: dict[str, Any]) -> list[bool]:
 @pytest.fixture(scope="module")
 def drawn() -> list[dict[str, Any]]:
     """Many rooms; room k is that of seed k."""
-    return list(rooms("cointhief+as_coded", 1000))
+    return list(rooms("cointhief+as_coded", 4000))
 
 
 class TestRooms:

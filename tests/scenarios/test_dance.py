@@ -210,7 +210,7 @@ def test_the_hidden_dancer_is_neither_seen_nor_heard_but_can_be_matched() -> Non
 @pytest.fixture(scope="module")
 def drawn() -> list[dict[str, Any]]:
     """Many rooms."""
-    return list(rooms("dance+as_coded", 1000))
+    return list(rooms("dance+as_coded", 4000))
 
 
 class TestDraws:

@@ -362,7 +362,7 @@ class TestDoors:
 @pytest.fixture(scope="module", params=NAMES)
 def drawn(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
     """Many rooms."""
-    return list(rooms(request.param, 1000))
+    return list(rooms(request.param, 4000))
 
 
 class TestRooms:

@@ -451,7 +451,7 @@ class TestTheSwitches:
 class TestRooms:
     @pytest.mark.parametrize("name", [*EXITER, *HELPER])
     def test_doors_switches_and_lava(self, name: str) -> None:
-        drawn = list(rooms(name, 1000))
+        drawn = list(rooms(name, 3000))
         for room in drawn:
             right, bottom = room["room"]["width"] - 1, room["room"]["height"] - 2
             assert [door["at"] for door in room["doors"]] == [[right, 1], [right, bottom]]
@@ -464,7 +464,7 @@ class TestRooms:
 
     @pytest.mark.parametrize("name", [*EXITER, *HELPER])
     def test_each_on_its_side(self, name: str) -> None:
-        drawn = list(rooms(name, 1000))
+        drawn = list(rooms(name, 4000))
         left, right = ("jill", "agent") if name in EXITER else ("agent", "jill")
         wide = [room for room in drawn if room["room"] == {"width": 8, "height": 8}]
         check_shares(
@@ -483,7 +483,7 @@ class TestRooms:
     @pytest.mark.parametrize("name", HELPER)
     def test_the_exiter_draws_its_door(self, name: str) -> None:
         check_shares(
-            (room["let"]["jill.goal"] for room in rooms(name, 1000)), evenly(("doors[0]", "doors[1]"))
+            (room["let"]["jill.goal"] for room in rooms(name, 3000)), evenly(("doors[0]", "doors[1]"))
         )
 
 

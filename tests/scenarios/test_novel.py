@@ -43,21 +43,21 @@ def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]
             return env.describe(), info, float(reward)
 
 
-@pytest.mark.parametrize("name", one_in(9, BEYOND, "plays 300 rooms"))
+@pytest.mark.parametrize("name", one_in(4, BEYOND, "plays 300 rooms"))
 def test_the_rooms_can_be_solved(name: str) -> None:
     """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
     solved = sum(bool(played(f"{name}+oracle", seed)[1]["success"]) for seed in range(300))
     assert solved >= (298 if name == "novel/culprit" else 300)
 
 
-@pytest.mark.parametrize("name", one_in(6, BEYOND, "loads every scenario"))
+@pytest.mark.parametrize("name", BEYOND)
 def test_nothing_looks_odd(name: str) -> None:
     assert sd.load(f"{name}+oracle").warnings == ()
 
 
 class TestWhisper:
     def test_one_of_four_words(self) -> None:
-        drawn = (room["let"]["secret"] for room in rooms("novel/whisper", 1000))
+        drawn = (room["let"]["secret"] for room in rooms("novel/whisper", 1500))
         check_shares(drawn, evenly(["saffron", "juniper", "clover", "thistle"]))
 
     def test_only_those_beside_hear_it(self) -> None:
@@ -78,7 +78,7 @@ class TestWhisper:
 
 class TestBargaining:
     def test_any_thing_may_have_any_price(self) -> None:
-        drawn = [room["let"] for room in rooms("novel/bargaining", 1000)]
+        drawn = [room["let"] for room in rooms("novel/bargaining", 1500)]
         check_shares((let["wanted"] for let in drawn), evenly(("the cup", "the coat", "the clock")))
         check_shares((let["tables.least[0]"] for let in drawn), evenly(range(3)))
         check_shares((let["more"] for let in drawn), evenly(range(1, 5)))
@@ -128,7 +128,7 @@ class TestConventions:
 
 class TestCulprit:
     def test_anybody_at_any_moment(self) -> None:
-        drawn = list(rooms("novel/culprit", 1000))
+        drawn = list(rooms("novel/culprit", 1500))
         check_shares((room["let"]["culprit"] for room in drawn), evenly(f"people[{k}]" for k in range(3)))
         check_shares((room["let"]["moment"] for room in drawn), evenly(range(3, 9)))
         assert all(len({one["color"] for one in room["people"]}) == 3 for room in drawn)
@@ -178,7 +178,7 @@ class TestInterpreter:
 
 class TestShop:
     def test_moods(self) -> None:
-        check_shares((room["let"]["keeper.mood"] for room in rooms("novel/shop", 1000)), evenly(range(3)))
+        check_shares((room["let"]["keeper.mood"] for room in rooms("novel/shop", 1500)), evenly(range(3)))
 
     @pytest.mark.parametrize("mood", range(3))
     @pytest.mark.parametrize("greetings", range(4))
@@ -308,7 +308,7 @@ class TestImplicature:
 
     def test_each_answer_is_right_in_a_third_of_the_rooms(self) -> None:
         answers = {(3, 3): "yes", (2, 3): "no"}
-        drawn = [room["let"] for room in rooms("novel/implicature", 1000)]
+        drawn = [room["let"] for room in rooms("novel/implicature", 1500)]
         right = (answers.get((let["lit"], let["looked_at"]), "nobody knows") for let in drawn)
         check_shares(right, evenly(("yes", "no", "nobody knows")))
 
@@ -381,7 +381,7 @@ class TestReferenceGame:
 
 class TestSarcasm:
     def test_bond_prize_and_idea_are_drawn_alone(self) -> None:
-        drawn = [room["let"] for room in rooms("novel/sarcasm", 1000)]
+        drawn = [room["let"] for room in rooms("novel/sarcasm", 1200)]
         check_shares(((let["friends"], let["prize"] == let["proposed"]) for let in drawn), FOUR)
 
     @pytest.mark.parametrize(("friends", "meant"), FOUR)
@@ -451,5 +451,5 @@ class TestTurnTaking:
 
     def test_patience_is_drawn(self) -> None:
         check_shares(
-            (room["let"]["patience"] for room in rooms("novel/turn_taking", 1000)), evenly([1, 2, 3])
+            (room["let"]["patience"] for room in rooms("novel/turn_taking", 1500)), evenly([1, 2, 3])
         )

@@ -188,7 +188,7 @@ class TestMisleading:
 
     def test_the_thing_it_is_about_is_drawn(self) -> None:
         name = school("boxes", "color", introduction="ask", misleading="true")
-        same = [room["let"]["decoy"] == room["let"]["target"] for room in rooms(name, 1000)]
+        same = [room["let"]["decoy"] == room["let"]["target"] for room in rooms(name, 1500)]
         check_shares(same, evenly([False, True]))
 
     def test_feedback(self) -> None:

@@ -8,7 +8,6 @@ import socialai_dsl as sd
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
 from socialai_dsl.episodes.scripts import script_of
-from tests.quick import one_in
 from tests.scenarios.playing import BEYOND
 
 ROOMS = 40
@@ -39,7 +38,7 @@ def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
     assert [str(peek) for peek in found.peeks] == []
 
 
-@pytest.mark.parametrize("name", one_in(9, ALL, "compiles every scenario twice"))
+@pytest.mark.parametrize("name", ALL)
 def test_a_script_leaves_actions_and_words_as_they_are(name: str) -> None:
     """Else no agent can be trained by it: the words would have other numbers in the scenario itself."""
     scripted, plain = sd.load(f"{name}+oracle"), sd.load(name)
@@ -50,7 +49,7 @@ def test_a_script_leaves_actions_and_words_as_they_are(name: str) -> None:
     assert scripted.checked.actions == plain.checked.actions
 
 
-@pytest.mark.parametrize("name", one_in(3, PAPER, "plays many rooms of every scenario"))
+@pytest.mark.parametrize("name", PAPER)
 def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
     scripted = sd.load(f"{name}+oracle")
     assert isinstance(scripted, sd.LoadedScenario)
@@ -58,6 +57,6 @@ def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
     assert solved_by_script(sd.compile(scripted), Effort(300)).mean() >= ceiling
 
 
-@pytest.mark.parametrize("name", one_in(4, AS_CODED, "compiles every scenario"))
+@pytest.mark.parametrize("name", AS_CODED)
 def test_a_script_also_plays_what_the_paper_s_tables_were_measured_on(name: str) -> None:
     assert script_of(name) is not None

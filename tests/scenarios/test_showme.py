@@ -399,7 +399,7 @@ def walls(room: dict[str, Any]) -> Iterator[tuple[str, int]]:
 class TestRooms:
     @pytest.mark.parametrize("name", [NAMES[0], ALONE[0]])
     def test_as_coded_the_door_is_in_one_of_three_walls(self, name: str) -> None:
-        drawn = list(rooms(name, 1000))
+        drawn = list(rooms(name, 4000))
         places = [place for room in drawn for place in walls(room)]
         check_shares((wall for wall, _ in places), evenly(("top", "left", "right")))
         wide = [place for room in drawn if room["room"]["width"] == 8 for place in walls(room)]
@@ -410,12 +410,12 @@ class TestRooms:
 
     @pytest.mark.parametrize("name", [NAMES[1], ALONE[1]])
     def test_as_in_the_paper_it_is_in_the_top_wall(self, name: str) -> None:
-        drawn = [room for room in rooms(name, 1000) if room["room"]["width"] == 7]
+        drawn = [room for room in rooms(name, 2000) if room["room"]["width"] == 7]
         check_shares((tuple(room["door"]["at"]) for room in drawn), evenly((x, 0) for x in range(1, 6)))
 
     @pytest.mark.parametrize("name", [*NAMES, *ALONE])
     def test_switches_and_door(self, name: str) -> None:
-        drawn = list(rooms(name, 1000))
+        drawn = list(rooms(name, 2000))
         for room in drawn:
             bottom = room["room"]["height"] - 1
             assert [switch["at"] for switch in room["switches"]] == [[x, bottom] for x in (1, 2, 3)]
@@ -426,7 +426,7 @@ class TestRooms:
 
     @pytest.mark.parametrize("name", NAMES)
     def test_the_peer_leaves_the_lowest_row_free(self, name: str) -> None:
-        drawn = list(rooms(name, 1000))
+        drawn = list(rooms(name, 4000))
         small = [room for room in drawn if room["room"] == {"width": 5, "height": 5}]
         cells = evenly((x, y) for x in (1, 2, 3) for y in (1, 2))
         check_shares((tuple(room["jim"]["at"]) for room in small), cells)

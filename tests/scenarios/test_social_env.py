@@ -50,7 +50,7 @@ def segment(member: str, lengths: dict[str, int]) -> range:
 class TestTheDraw:
     @pytest.mark.parametrize("suite", SUITES)
     def test_members_are_drawn_evenly_for_each_episode(self, suite: str) -> None:
-        check_shares((room["member"] for room in rooms(suite, 1000)), evenly(MEMBERS))
+        check_shares((room["member"] for room in rooms(suite, 3000)), evenly(MEMBERS))
         env, members = made(suite), set()
         env.reset(seed=0)
         for _ in range(60):

@@ -54,7 +54,7 @@ def front(room: dict[str, Any], door: dict[str, Any]) -> tuple[int, int]:
 @pytest.fixture(scope="module")
 def drawn() -> list[dict[str, Any]]:
     """Many rooms."""
-    return list(rooms("talkitout", 1000))
+    return list(rooms("talkitout", 2000))
 
 
 class TestRooms:

@@ -10,7 +10,6 @@ import pytest
 from socialai_dsl.cli.main import _COMMANDS, main
 from socialai_dsl.cli.model_options import MODEL_OPTIONS
 from socialai_dsl.model_options import meanings
-from tests.quick import one_in
 from trainer.config import HYPER
 
 Capture = pytest.CaptureFixture[str]
@@ -90,12 +89,7 @@ def test_a_number_that_cannot_be_is_refused_by_name(command: str, option: str, c
 
 
 @pytest.mark.parametrize(
-    "value",
-    one_in(
-        4,
-        ["nan", "NaN", "-Infinity", "1e999", "9" * 5000, "[" * 20_000, '{"a": 1}', "-1e9"],
-        "starts a command for each option",
-    ),
+    "value", ["nan", "NaN", "-Infinity", "1e999", "9" * 5000, "[" * 20_000, '{"a": 1}', "-1e9"]
 )
 def test_no_option_of_the_trainer_takes_what_is_no_value(value: str, capsys: Capture) -> None:
     for name in HYPER:

@@ -100,7 +100,7 @@ OBJECTS = st.recursive(
 
 
 @given(OBJECTS.map(lambda one: json.dumps(one).encode()) | OBJECTS.map(sent) | st.binary())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=500, deadline=None)
 def test_whatever_a_server_sends_is_an_answer_or_none(content: bytes) -> None:
     found = read_completion(content)
     read_error(content)
