@@ -153,7 +153,7 @@ def meta_of(session: Session, **changes: Any) -> dict[str, str]:
         {"surprise": 1},
         {"frames": -1},
         {"vocabulary": 3},
-        {"action_sizes": [4, 2, 2]},
+        {"action_sizes": [4, 2]},
         {"config": {"lr": "fast"}},
     ],
 )
