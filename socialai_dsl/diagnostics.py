@@ -214,6 +214,11 @@ class DiagnosticBag:
         """Add several findings."""
         self._found.update(dict.fromkeys(diagnostics))
 
+    def drop(self, diagnostics: Iterable[Diagnostic]) -> None:
+        """Leave out several findings."""
+        for diagnostic in diagnostics:
+            self._found.pop(diagnostic, None)
+
     def error(self, code: str, message: str, span: Span, **advice: Unpack[Advice]) -> None:
         """Add an error."""
         self.add(Diagnostic(code, message, span, Severity.ERROR, **advice))

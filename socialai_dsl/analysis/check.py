@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from socialai_dsl.analysis.coverage import coverage
 from socialai_dsl.analysis.depth import depth
@@ -33,6 +34,8 @@ def check_scenario(
     deep: bool = False,
     say: Say | None = None,
     texts: Texts = None,
+    script: LoadedScenario | None = None,
+    named: bool = True,
 ) -> ScenarioReport:
     """Try what a scenario claims, whether it can be known, and whether everything in it can happen.
 
@@ -43,9 +46,13 @@ def check_scenario(
         deep: also try what success takes.
         say: takes the lines of the report as they come.
         texts: those that the scenario was loaded with.
+        script: the same with a frame for the agent, where that is known.
+        named: whether a command plays it by its name.
     """
     place = loaded.resolved.tree.key_span(("outcome",))
-    report = ScenarioReport(called, effort.rooms, effort.seed, place, sources=loaded.resolved.files)
+    report = ScenarioReport(
+        called, effort.rooms, effort.seed, place, sources=loaded.resolved.files, named=named
+    )
     said = 0
 
     def part(tasks: int) -> Effort:
@@ -60,7 +67,7 @@ def check_scenario(
 
     tell()
     try:
-        scripted = _scripted(loaded, called, texts)
+        scripted = script or _scripted(loaded, called, texts)
         trial = Trial(loaded, effort, scripted)
         plans = by_default(loaded, place)
         for number, plan in enumerate(plans):
@@ -98,12 +105,34 @@ def _tried(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         return Evidence().report("", None)
 
 
-def scenarios_of(name: str, texts: Texts = None) -> list[tuple[LoadedScenario, str]]:
-    """The scenario of a name, or the members of a suite, each with its own."""
+class Case(NamedTuple):
+    """A scenario that is to be checked.
+
+    Attributes:
+        loaded: the scenario. called: its name. script: the same with a frame for the agent, where that is known.
+        named: whether a command plays it by its name; a suite may change its members.
+    """
+
+    loaded: LoadedScenario
+    called: str
+    script: LoadedScenario | None = None
+    named: bool = True
+
+
+def scenarios_of(name: str, texts: Texts = None) -> list[Case]:
+    """The scenario of a name, or the members of a suite, each once however many start in other rooms."""
     loaded = load(name, texts)
-    if isinstance(loaded, LoadedSuite):
-        return list({member.name: (member, member.name) for member in loaded.members}.values())
-    return [(loaded, name)]
+    if isinstance(loaded, LoadedScenario):
+        return [Case(loaded, name)]
+    scripted = closest_script(name, loaded, texts).loaded
+    assert isinstance(scripted, LoadedSuite), "internal: a variant of a suite is a suite"
+    silent, found = unscripted(scripted), dict[str, Case]()
+    for called, member, script in zip(loaded.member_names, loaded.members, scripted.members, strict=True):
+        changed = any(edit.span.file == loaded.resolved.tree.file for edit in member.resolved.edits)
+        own = None if called in silent else script
+        case = Case(member, called if changed else member.name, own, not changed)
+        found.setdefault(repr((member.resolved.data, member.resolved.params)), case)
+    return list(found.values())
 
 
 def _scripted(loaded: LoadedScenario, called: str, texts: Texts) -> LoadedScenario | None:

@@ -21,6 +21,11 @@ _QUIET: Final = 1.0
 T = TypeVar("T")
 
 
+def why_no_more(interrupted: bool, command: str = "") -> str:
+    """Why something was not tried to its end; `command` has the option, if it is not the one that tells."""
+    return "it was interrupted" if interrupted else f"`{command}--seconds` gives more time"
+
+
 class OutOfTimeError(Exception):
     """The time of a task is spent, or an interruption was requested, before anything was found out."""
 

@@ -103,6 +103,8 @@ class Trial:
 
     def check(self, plan: PropertyPlan, effort: Effort) -> Report:
         """Try one property, with the same rooms, for as long as the clock of the effort says."""
+        if plan.unasked:
+            return Report(Verdict.UNASKED, 0, 0, 0, (), plan.unasked, 0)
         match plan.kind:
             case "reachable" | "never":
                 return _reaching(self, plan, effort)

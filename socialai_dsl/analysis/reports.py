@@ -20,6 +20,7 @@ class Verdict(Enum):
     HOLDS = "holds"
     FAILS = "fails"
     UNDECIDED = "undecided"
+    UNASKED = "not asked"
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Report:
     """The result of one property.
 
     Attributes:
-        verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried.
+        verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried; not asked of
+            a scenario that was changed so that there is nothing to ask about.
         rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
         against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
         said: what was found, in words.

@@ -8,6 +8,7 @@ from typing import Any, Final
 from socialai_dsl.analysis.alone import Alone
 from socialai_dsl.analysis.coverage import Coverage
 from socialai_dsl.analysis.depth import Depth
+from socialai_dsl.analysis.effort import why_no_more
 from socialai_dsl.analysis.properties import RIVAL_ROOMS
 from socialai_dsl.analysis.reports import Report, rooms_text
 from socialai_dsl.diagnostics import Diagnostic, Severity
@@ -28,6 +29,7 @@ class ScenarioReport:
         depth: what success takes, if that was tried.
         sources: the files of the scenario, whose comments may ignore warnings.
         complete: whether the check has ended. interrupted: whether the user stopped it.
+        named: whether a command plays the scenario by its name.
     """
 
     scenario: str
@@ -40,6 +42,7 @@ class ScenarioReport:
     sources: Mapping[str, Source] = field(default_factory=dict)
     complete: bool = False
     interrupted: bool = False
+    named: bool = True
 
     def findings(self) -> Iterator[Diagnostic]:
         """Failures as errors, undecided claims and parts that never happen as warnings, each at its place; without
@@ -52,22 +55,20 @@ class ScenarioReport:
         return not_ignored(self._parts(), self.sources)
 
     def summary(self) -> Iterator[str]:
-        """The lines of the report without its claims and findings."""
+        """The lines of the report without its claims and findings, for the studio."""
         yield f"{self.scenario}: {self.rooms} rooms of seed {self.seed}"
         if self.coverage is not None:
             yield from _coverage(self.coverage, ())
         if self.depth is not None:
             yield from _depth(self.depth, self.rooms)
         if self.complete:
-            yield from self._sufficed()
+            yield from self._sufficed("socialai check ")
 
     def _found(self) -> Iterator[Diagnostic]:
         for plan, report in self.tried:
-            hint = (
-                f"{_listed(report.against)}; to see it: {self._command(plan, report)}"
-                if report.against
-                else None
-            )
+            hint = _listed(report.against) if report.against else None
+            if report.against and self.named:
+                hint = f"{hint}; to see it: {self._command(plan, report)}"
             if report.verdict.value == "fails":
                 message = f"`{plan.text}` does not hold: {report.said}"
                 yield Diagnostic("S801", message, plan.span, hint=hint)
@@ -109,7 +110,7 @@ class ScenarioReport:
             if report.verdict.value != "holds":
                 numbers = ", ".join(map(str, report.against))
                 yield f"    at {_place(plan.span)}" + (f"; rooms {numbers}" if numbers else "")
-                if numbers:
+                if numbers and self.named:
                     yield f"    to see it: {self._command(plan, report)}"
         if self.coverage is not None:
             yield from _coverage(self.coverage, {finding.span for finding in self.findings()})
@@ -125,9 +126,9 @@ class ScenarioReport:
         room = ["--seed", str(self.seed), "--index", str(report.against[0])]
         return trace_command(name, room, report.acts)
 
-    def _sufficed(self) -> Iterator[str]:
-        """What there was time for, where there was not for all."""
-        counts = [(f"`{plan.text}`", report.rooms) for plan, report in self.tried]
+    def _sufficed(self, command: str = "") -> Iterator[str]:
+        """What there was time for, where there was not for all; see `why_no_more`."""
+        counts = [(f"`{plan.text}`", report.rooms) for plan, report in self.tried if not plan.unasked]
         if self.depth is not None:
             counts.append(("shortest successes", self.depth.rooms))
             if self.depth.alone is not None:
@@ -139,7 +140,7 @@ class ScenarioReport:
         ]
         if short:
             listed = ", ".join(f"{count} for {what}" for what, count in short)
-            why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+            why = why_no_more(self.interrupted, command)
             yield f"  of {self.rooms} rooms there was time for {listed}; {why}"
         elif self.interrupted:
             yield "  it was interrupted before all was tried"

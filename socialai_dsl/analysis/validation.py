@@ -106,8 +106,8 @@ def _tried(result: CheckResult, effort: Callable[[], Effort], say: Say | None) -
 
     # What was checked, also where it came from standard input.
     texts = {source.path: source for source in result.sources.values() if source.path is not None}
-    for scenario, called in scenarios_of(result.name, texts):
-        report = check_scenario(scenario, called, effort(), deep=True, say=say, texts=texts)
+    for loaded, called, script, named in scenarios_of(result.name, texts):
+        report = check_scenario(loaded, called, effort(), True, say, texts, script, named)
         yield from report.findings()
         if report.interrupted:
             raise KeyboardInterrupt

@@ -318,6 +318,8 @@ class Draft:
     Attributes:
         scenario: its models. name: with variants.
         shaped: the data the models were made of. values: its parameters. patched: whether a variant changed it.
+        patches: the names of the files that patch it; None: nothing changes it, neither a patch nor a given parameter
+            nor a rival that plays.
     """
 
     scenario: Scenario
@@ -325,6 +327,7 @@ class Draft:
     shaped: ShapedFile[Scenario]
     values: Mapping[str, Value]
     patched: bool = False
+    patches: frozenset[str] | None = None
 
     def with_actions(self, actions: tuple[str, ...]) -> Draft:
         """The same with other body actions, as a suite gives them to all its members."""
@@ -375,7 +378,17 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag, tests: Node | None = No
     shaped = model_of(Scenario, whole.tree, bag, partial=abstract)
     if shaped.model is None or abstract or failed:
         return None
-    return Draft(shaped.model, resolved.name, shaped, values, bool(resolved.edits))
+    patched = bool(resolved.edits)
+    return Draft(shaped.model, resolved.name, shaped, values, patched, _patches(resolved, shaped.model))
+
+
+def _patches(resolved: ResolvedFile, scenario: Scenario) -> frozenset[str] | None:
+    """The files that patch a scenario, if a patch, a given parameter or a rival changes it; None: it is as written."""
+    agent = scenario.members().get(_AGENT)
+    rival_plays = agent is not None and agent.frame in scenario.rivals
+    if not (resolved.edits or resolved.params or rival_plays):
+        return None
+    return frozenset(edit.span.file for edit in resolved.edits)
 
 
 def with_rival(resolved: ResolvedFile, rival: str) -> ResolvedFile:
@@ -452,7 +465,9 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     """
     found = DiagnosticBag()
     shaped = draft.shaped
-    checked = check_meaning(draft.scenario, draft.name, shaped.tree, found, prelude(), draft.values)
+    checked = check_meaning(
+        draft.scenario, draft.name, shaped.tree, found, prelude(), draft.values, draft.patches
+    )
     if draft.patched:
         found = DiagnosticBag(d for d in found if d.code not in _OF_ALL_VARIANTS)
     if not bag.has_errors:

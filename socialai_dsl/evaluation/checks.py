@@ -4,9 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from socialai_dsl.analysis.check import Say, check_scenario, compile_engine, scenarios_of
+from socialai_dsl.analysis.check import Case, Say, check_scenario, compile_engine, scenarios_of
 from socialai_dsl.analysis.effort import EPISODES, Clock, Effort, Tell
-from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.evaluation.coverage_report import coverage
 from socialai_dsl.evaluation.scripts import play_script
 
@@ -66,7 +65,7 @@ def check(asked: Asked, tell: Tell | None = None, say: Say | None = None) -> Che
         ScenarioError: a scenario has mistakes.
         UsageError: an agent cannot play, or there is no script.
     """
-    scenarios = [pair for name in asked.scenarios for pair in scenarios_of(name)]
+    scenarios = [case for name in asked.scenarios for case in scenarios_of(name)]
     compile_engine()  # before the time begins
     clock = Clock(None if asked.seconds is None else asked.seconds * len(scenarios), tell)
     results: list[Result] = []
@@ -81,13 +80,13 @@ def check(asked: Asked, tell: Tell | None = None, say: Say | None = None) -> Che
     return Checks(results, clock.interrupted)
 
 
-def _claims(
-    asked: Asked, scenarios: Sequence[tuple[LoadedScenario, str]], clock: Clock, say: Say | None
-) -> Iterator[Result]:
-    for number, (scenario, called) in enumerate(scenarios):
+def _claims(asked: Asked, scenarios: Sequence[Case], clock: Clock, say: Say | None) -> Iterator[Result]:
+    for number, case in enumerate(scenarios):
         own = clock.part(len(scenarios) - number)
         effort = Effort(asked.rooms, asked.seed, asked.states, own)
-        report = check_scenario(scenario, called, effort, asked.deep, say)
+        report = check_scenario(
+            case.loaded, case.called, effort, asked.deep, say, script=case.script, named=case.named
+        )
         yield Result(report.as_object(), report.fails(asked.strict))
         if clock.interrupted:
             return

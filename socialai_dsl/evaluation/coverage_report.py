@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.analysis.effort import EPISODES, Clock
+from socialai_dsl.analysis.effort import EPISODES, Clock, why_no_more
 from socialai_dsl.analysis.tally import Part, Tally, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
@@ -207,7 +207,7 @@ class Coverage:
     def _shortage(self) -> Iterator[str]:
         played = sum(tally.episodes for tally in self.tallies.values())
         if played < self.planned:
-            why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+            why = why_no_more(self.interrupted)
             yield f"of {self.planned:,} episodes there was time for {played:,}; {why}"
 
     def as_object(self) -> dict[str, Any]:

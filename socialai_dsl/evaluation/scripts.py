@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from socialai_dsl.analysis.effort import Clock
+from socialai_dsl.analysis.effort import Clock, why_no_more
 from socialai_dsl.analysis.search import Finding, search_rooms
 from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
@@ -104,7 +104,7 @@ class ScriptReport:
         return [*lines, *self._shortage()]
 
     def _shortage(self) -> Iterator[str]:
-        why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+        why = why_no_more(self.interrupted)
         if self.rooms < self.planned:
             yield f"  of {self.planned:,} rooms there was time to play {self.rooms:,}; {why}"
         if self.searched < len(self.unsolved):

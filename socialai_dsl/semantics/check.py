@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from operator import itemgetter
 from typing import Final, get_args
@@ -90,13 +90,29 @@ Draw = tuple[str, tuple[int, ...]]
 
 
 def properties(
-    resolver: Resolver, outcomes: tuple[OutcomePlan, ...], drawn: Iterable[Drawn]
+    resolver: Resolver,
+    outcomes: tuple[OutcomePlan, ...],
+    drawn: Iterable[Drawn],
+    patches: Container[str] | None,
 ) -> Iterator[PropertyPlan]:
-    """The entries of `check`, in the order written; those with a mistake are left out once it has been reported."""
+    """The entries of `check`, in the order written; those with a mistake are left out once it has been reported.
+
+    `patches` are the files that patch the scenario; None: nothing changes it. What changes it may fix or take away what
+    an entry asks about. That is no mistake but a reason not to ask, unless a patch wrote the entry.
+    """
     lets = {item.path: item for item in drawn if item.path.startswith("let.")}
+    bag = resolver.findings.bag
     for i, entry in enumerate(resolver.symbols.scenario.check):
         with surviving():
-            yield _Entry(resolver, entry, ("check", i)).plan(outcomes, lets)
+            written, before = _Entry(resolver, entry, ("check", i)), [*bag]
+            try:
+                yield written.plan(outcomes, lets)
+            except FailedError:
+                found = [d for d in bag if d not in before]
+                if not found or patches is None or any(d.span.file in patches for d in found):
+                    raise
+                bag.drop(found)
+                yield written.unasked(found)
 
 
 class _Entry:
@@ -155,6 +171,19 @@ class _Entry:
                     raise self._not_a_pick((*place, "draw"), word)
                 text = f"only_through: {word} by {', '.join(members)}"
                 return replace(plan, text=text, members=members, draws=((path, values),))
+
+    def unasked(self, reasons: Iterable[Diagnostic]) -> PropertyPlan:
+        """The entry that is not asked."""
+        kind, entry = self._kind(), self._entry
+        asked = getattr(entry, kind)
+        if kind == "needs":
+            asked = ", ".join(asked)
+        elif entry.only_through is not None:
+            asked = f"{entry.only_through.draw} by {', '.join(entry.only_through.by)}"
+        why = ", ".join(reason.message for reason in reasons)
+        return PropertyPlan(
+            kind, f"{kind}: {asked}", self._findings.places.key_span((*self._path, kind)), unasked=why
+        )
 
     def _kind(self) -> PropertyKind:
         given = [kind for kind in KINDS if getattr(self._entry, kind) is not None]
@@ -270,6 +299,7 @@ def check_meaning(
     bag: DiagnosticBag,
     prelude: Prelude,
     params: Mapping[str, Scalar] | None = None,
+    patches: Container[str] | None = None,
 ) -> CheckedScenario | None:
     """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
 
@@ -283,6 +313,8 @@ def check_meaning(
         bag: takes the findings.
         prelude: object types.
         params: the values of the file's parameters.
+        patches: the names of the files that patch it; None: nothing changes it, neither a patch nor a given parameter
+            nor a rival that plays.
     """
     words: dict[str, Type] = {}
     ranges = Ranges(scenario)
@@ -293,7 +325,7 @@ def check_meaning(
         if AGENT not in scenario.cast:
             _no_agent(scenario, findings)
             break
-        run = _Run(scenario, findings, prelude, words, ranges.now)
+        run = _Run(scenario, findings, prelude, words, ranges.now, patches)
         checked = run.checked(name)
         registers = run.resolver.registers
         settled = registers.words == words
@@ -355,8 +387,10 @@ class _Run:
         prelude: Prelude,
         words: Mapping[str, Type],
         ranges: Mapping[str, Type],
+        patches: Container[str] | None,
     ) -> None:
         self._scenario = scenario
+        self._patches = patches
         self._findings = findings
         sizes = room_sizes(scenario, findings)
         self._symbols = entities.symbols_of(scenario, prelude, sizes, findings)
@@ -407,7 +441,7 @@ class _Run:
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
-        claimed = tuple(properties(resolver, outcomes, drawn))
+        claimed = tuple(properties(resolver, outcomes, drawn, self._patches))
         asked = probes(resolver)
         tested = dialogues(resolver, outcomes)
         for one in (*rules, *(one for plan in plans for one in plan.causing)):

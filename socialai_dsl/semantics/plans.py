@@ -446,6 +446,7 @@ class PropertyPlan:
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
     `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
     what success depends on is to be `knowable`, or not to be. `rival`: whose share of rooms is at most `share`.
+    `unasked`: why there is nothing to try: what a patch fixed or took away.
     """
 
     kind: PropertyKind
@@ -460,6 +461,7 @@ class PropertyPlan:
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
     expected: bool = True
     rival: str = ""
+    unasked: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,7 @@ def shared_space(
         shared, mapped = _shared(suite.grammar, fillers, words)
         slots.append(Slot(name, shared))
         maps.append(mapped)
-    slot_maps = tuple(zip(*maps, strict=True))
+    slot_maps = tuple(tuple(mapped[number] for mapped in maps) for number in range(len(members)))
     sentences = Sentences.shared(templates, slots, list(zip(own, template_maps, strict=True)))
     space = SharedSpace(actions, sentences, template_maps, slot_maps)
     if written is not None and not bag.has_errors:

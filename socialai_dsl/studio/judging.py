@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.checking.loaded import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity, printable
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
@@ -27,25 +27,31 @@ _CHECK_SECONDS: Final = 20.0
 
 def judge_claims(path: str, text: str) -> Reply:
     """What `socialai check` finds of a text."""
-    from socialai_dsl.analysis.check import check_scenario, compile_engine
+    from socialai_dsl.analysis.check import check_scenario, compile_engine, scenarios_of
     from socialai_dsl.analysis.effort import Clock, Effort
 
     own, texts = display_name(Path(path)), texts_of(path, text)
     try:
-        loaded = load(path, texts)
+        loaded, cases = load(path, texts), scenarios_of(path, texts)
     except ScenarioError as error:
         return {"claims": [], "findings": [finding(one, own) for one in error.diagnostics], "lines": []}
-    if not isinstance(loaded, LoadedScenario):
-        raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
     compile_engine()  # before the time begins
-    effort = Effort(100, 0, clock=Clock(_CHECK_SECONDS, lambda said: None))
-    report = check_scenario(loaded, path, effort, texts=texts)
-    report.scenario = own
-    return {
-        "claims": [_claim(plan, found, report.seed, own) for plan, found in report.tried],
-        "findings": [finding(one, own) for one in report.parts()],
-        "lines": list(report.summary()),
-    }
+    clock, is_suite = Clock(_CHECK_SECONDS, lambda said: None), isinstance(loaded, LoadedSuite)
+    reply: Reply = {"claims": [], "findings": [], "lines": []}
+    for number, (member, called, script, named) in enumerate(cases):
+        effort = Effort(100, 0, clock=clock.part(len(cases) - number))
+        report = check_scenario(member, called, effort, texts=texts, script=script, named=named)
+        if not is_suite:
+            report.scenario = own
+        of = f"{called}: " if is_suite else ""
+        claims = (_claim(plan, found, report.seed, own) for plan, found in report.tried)
+        # The window plays a suite, which draws what it plays: none of its rooms is that of a member.
+        reply["claims"] += [
+            {**one, "claim": of + one["claim"], "shown": None} if of else one for one in claims
+        ]
+        reply["findings"] += [finding(one, own) for one in report.parts()]
+        reply["lines"] += report.summary()
+    return reply
 
 
 def judge_tests(path: str, text: str) -> Reply:

@@ -360,7 +360,7 @@ class Claim(_Placed):
     """
 
     claim: str
-    verdict: Literal["holds", "fails", "undecided"]
+    verdict: Literal["holds", "fails", "undecided", "not asked"]
     said: str
     shown: Shown | None
 

@@ -176,8 +176,8 @@ def tried_out(name: str) -> CheckResult:
     result = check(name)
     found = [
         finding
-        for scenario, called in scenarios_of(name)
-        for finding in check_scenario(scenario, called, Effort(4, 0, 2000), deep=True).findings()
+        for case in scenarios_of(name)
+        for finding in check_scenario(case.loaded, case.called, Effort(4, 0, 2000), deep=True).findings()
     ]
     return replace(result, diagnostics=(*result.diagnostics, *found))
 

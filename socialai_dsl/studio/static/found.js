@@ -52,7 +52,7 @@ export function page(text) {
 }
 
 /** @typedef {{room: Record<string, any>, variant: string, acts: string[] | null}} Shown */
-/** @typedef {{file: string | null, line: number, column: number, claim: string, verdict: "holds" | "fails" | "undecided", said: string, shown: Shown | null}} Claim */
+/** @typedef {{file: string | null, line: number, column: number, claim: string, verdict: "holds" | "fails" | "undecided" | "not asked", said: string, shown: Shown | null}} Claim */
 /** @typedef {{file: string | null, line: number, column: number, test: string, scenario: string, rooms: number, passes: boolean, findings: Finding[], shown: Shown | null}} TestResult */
 
 /** @type {Record<string, {kind: "good" | "bad" | "open", text: string}>} */
@@ -60,6 +60,7 @@ const VERDICTS = {
   holds: { kind: "good", text: "✓ holds" },
   fails: { kind: "bad", text: "✗ fails" },
   undecided: { kind: "open", text: "? undecided" },
+  "not asked": { kind: "open", text: "– not asked" },
   passes: { kind: "good", text: "✓ passes" },
 };
 

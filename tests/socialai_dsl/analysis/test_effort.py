@@ -51,8 +51,8 @@ check:
 @pytest.fixture
 def endless(tmp_path: Path) -> Any:
     (tmp_path / "endless.yaml").write_text(ENDLESS, encoding="utf-8")
-    ((loaded, name),) = scenarios_of(str(tmp_path / "endless.yaml"))
-    return loaded, name
+    (case,) = scenarios_of(str(tmp_path / "endless.yaml"))
+    return case.loaded, case.called
 
 
 def test_a_check_ends_with_its_time(endless: Any, monkeypatch: pytest.MonkeyPatch) -> None:
