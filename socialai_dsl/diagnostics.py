@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Final, TypedDict, Unpack
+from typing import Any, Final, TypedDict, Unpack
 
 from socialai_dsl.cures import Cure, Hint
 from socialai_dsl.source import Source, Span, TextEdit
@@ -443,8 +443,18 @@ def is_usage(diagnostics: Iterable[Diagnostic]) -> bool:
     return all(d.code == "S007" or not Path(d.span.file).is_file() for d in diagnostics)
 
 
-def to_json(diagnostics: Iterable[Diagnostic]) -> list[dict[str, str | int | None]]:
-    """The findings as JSON-able objects: file, line, column, severity, code, message, hint."""
+def to_json(
+    diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source] | None = None
+) -> list[dict[str, Any]]:
+    """The findings as JSON-able objects: file, line, column, severity, code, message, hint, and with `sources` edits.
+
+    `edits` are the changes that cure it: what stands from `line` and `column` to before `end_line` and `end_column` of
+    `file` becomes `text`.
+
+    Args:
+        diagnostics: the findings.
+        sources: name -> source of the files that the changes are made in.
+    """
     return [
         {
             "file": d.span.file,
@@ -455,5 +465,18 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> list[dict[str, str | int | Non
             "message": d.text,
             "hint": d.help,
         }
+        | ({} if sources is None else {"edits": [_edit_to_json(edit, sources) for edit in d.edits]})
         for d in diagnostics
     ]
+
+
+def _edit_to_json(edit: TextEdit, sources: Mapping[str, Source]) -> dict[str, Any]:
+    start, end = sources[edit.span.file].ends(edit)
+    return {
+        "file": start.file,
+        "line": start.line,
+        "column": start.column,
+        "end_line": end.line,
+        "end_column": end.column,
+        "text": edit.text,
+    }

@@ -89,6 +89,11 @@ class Source:
         line = bisect(self._starts, start)
         return TextEdit(self.span(line, start - self._starts[line - 1] + 1, end - start), text)
 
+    def ends(self, edit: TextEdit) -> tuple[Span, Span]:
+        """Where the characters that a change takes away begin, and the place behind them; both are of no width."""
+        start = self.index(edit.span)
+        return self.edit(start, start, "").span, self.edit(stop := start + edit.span.width, stop, "").span
+
     def edited(self, edits: Iterable[TextEdit]) -> str:
         """The text after changes that do not overlap."""
         text = self.text

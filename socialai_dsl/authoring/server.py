@@ -106,9 +106,7 @@ class Server(LanguageServer):
     def _range_of(self, edit: TextEdit, source: Source) -> lsp.Range:
         """The place of a change, which may be several lines, as the editor counts."""
         codec, lines = self.workspace.position_codec, [line + "\n" for line in source.lines()]
-        start = source.index(edit.span)
-        first, behind = (source.edit(index, index, "").span for index in (start, start + edit.span.width))
-        places = (lsp.Position(span.line - 1, span.column - 1) for span in (first, behind))
+        places = (lsp.Position(span.line - 1, span.column - 1) for span in source.ends(edit))
         return lsp.Range(*(codec.position_to_client_units(lines, place) for place in places))
 
     def cures(self, uri: str, wanted: lsp.Range) -> list[lsp.CodeAction]:

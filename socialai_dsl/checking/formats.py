@@ -1,7 +1,7 @@
 """The findings in checked files, as tools and code hosts read them."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 from urllib.parse import quote
@@ -54,7 +54,7 @@ def limited(checked: Sequence[CheckedInput], most: int) -> list[CheckedInput]:
 
 def as_json(checked: Sequence[CheckedInput]) -> str:
     """An array of findings."""
-    return _json(to_json(every_finding(checked)))
+    return _json(to_json(every_finding(checked), _sources(checked)))
 
 
 def as_github(checked: Sequence[CheckedInput]) -> str:
@@ -75,7 +75,7 @@ def as_github(checked: Sequence[CheckedInput]) -> str:
 
 def as_sarif(checked: Sequence[CheckedInput]) -> str:
     """A SARIF 2.1.0 log."""
-    diagnostics = every_finding(checked)
+    diagnostics, sources = every_finding(checked), _sources(checked)
     rules = [
         {"id": code, "shortDescription": {"text": CODES[code]}}
         for code in sorted({d.code for d in diagnostics})
@@ -83,7 +83,7 @@ def as_sarif(checked: Sequence[CheckedInput]) -> str:
     run = {
         "tool": {"driver": {"name": "socialai", "rules": rules}},
         "columnKind": "unicodeCodePoints",
-        "results": [_sarif_result(d) for d in diagnostics],
+        "results": [_sarif_result(d, sources) for d in diagnostics],
     }
     log = {
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
@@ -140,14 +140,39 @@ def _escape(text: str, also: str = "") -> str:
     return text
 
 
-def _sarif_result(diagnostic: Diagnostic) -> dict[str, Any]:
+def _sources(checked: Iterable[CheckedInput]) -> dict[str, Source]:
+    return {name: source for c in checked for name, source in c.sources.items()}
+
+
+def _sarif_result(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> dict[str, Any]:
     span = diagnostic.span
     region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + span.width}
-    uri = quote(span.file.replace("\\", "/"))
-    location = {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": region}}
-    return {
+    location = {"physicalLocation": {"artifactLocation": _artifact(span.file), "region": region}}
+    result = {
         "ruleId": diagnostic.code,
         "level": diagnostic.severity.value,
         "message": {"text": _with_hint(diagnostic)},
         "locations": [location],
     }
+    return {**result, "fixes": [_sarif_fix(diagnostic, sources)]} if diagnostic.edits else result
+
+
+def _sarif_fix(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> dict[str, Any]:
+    """The changes that cure a finding, file by file."""
+    changes: dict[str, list[dict[str, Any]]] = {}
+    for edit in diagnostic.edits:
+        start, end = sources[edit.span.file].ends(edit)
+        region = {"startLine": start.line, "startColumn": start.column}
+        region |= {"endLine": end.line, "endColumn": end.column}
+        replacement = {"deletedRegion": region, "insertedContent": {"text": edit.text}}
+        changes.setdefault(edit.span.file, []).append(replacement)
+    return {
+        "description": {"text": printable(diagnostic.cure)},
+        "artifactChanges": [
+            {"artifactLocation": _artifact(file), "replacements": own} for file, own in changes.items()
+        ],
+    }
+
+
+def _artifact(file: str) -> dict[str, str]:
+    return {"uri": quote(file.replace("\\", "/"))}

@@ -62,7 +62,7 @@ class PlayedTest:
             "passes": not self.fails,
             "rooms": len(seeds_of(self.plan)),
             "seconds": round(self.seconds, 3),
-            "findings": to_json(self.outcome.diagnostics),
+            "findings": to_json(self.outcome.diagnostics, self.outcome.sources),
         }
 
 

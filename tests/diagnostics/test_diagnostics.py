@@ -5,6 +5,7 @@ Most are slips in a right file; see `tests/slips.py`.
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -13,12 +14,15 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
+from itertools import accumulate
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
 from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.checking.formats import CheckedInput, as_json, as_sarif
 from socialai_dsl.diagnostics import CODES, Diagnostic, render_text
 from socialai_dsl.evaluation.scenario_tests import play_tests
 from socialai_dsl.frontend import CheckResult, check
@@ -107,12 +111,42 @@ def kinds(found: Iterable[Diagnostic]) -> Counter[tuple[str, str]]:
     return Counter((one.code, one.message) for one in found)
 
 
-@contextmanager
-def followed(found: Diagnostic, sources: dict[str, Source]) -> Iterator[None]:
-    """The files, in the working directory, as they are with a cure."""
+def as_a_tool_follows(case: str, found: Diagnostic, sources: dict[str, Source]) -> dict[str, str]:
+    """The files as they are with a cure: a tool that reads JSON, or SARIF, makes the same of them."""
     files = {edit.span.file for edit in found.edits}
-    for file in files:
-        text = sources[file].edited(edit for edit in found.edits if edit.span.file == file)
+    texts = {
+        file: sources[file].edited(edit for edit in found.edits if edit.span.file == file) for file in files
+    }
+    read = [CheckedInput(case, (found,), sources)]
+    (one,) = json.loads(as_json(read))
+    ((result,),) = (run["results"] for run in json.loads(as_sarif(read))["runs"])
+    (fix,) = result["fixes"]
+    by_json, by_sarif = {file: [] for file in files}, {}
+    for edit in one["edits"]:
+        place = (edit["line"], edit["column"], edit["end_line"], edit["end_column"])
+        by_json[edit["file"]].append((*place, edit["text"]))
+    for change in fix["artifactChanges"]:
+        keys = ("startLine", "startColumn", "endLine", "endColumn")
+        by_sarif[unquote(change["artifactLocation"]["uri"])] = [
+            (*(each["deletedRegion"][key] for key in keys), each["insertedContent"]["text"])
+            for each in change["replacements"]
+        ]
+    assert by_sarif == by_json
+    for file, edits in by_json.items():
+        lines = re.split("(?<=\n)|(?<=\r)(?!\n)", sources[file].text)
+        starts = [0, *accumulate(map(len, lines))]
+        text = sources[file].text
+        for line, column, end_line, end_column, new in sorted(edits, reverse=True):
+            text = text[: starts[line - 1] + column - 1] + new + text[starts[end_line - 1] + end_column - 1 :]
+        assert text == texts[file]
+    return texts
+
+
+@contextmanager
+def followed(case: str, found: Diagnostic, sources: dict[str, Source]) -> Iterator[None]:
+    """The files, in the working directory, as they are with a cure."""
+    files = as_a_tool_follows(case, found, sources)
+    for file, text in files.items():
         Path(file).write_text(text, encoding="utf-8", newline="")
     yield
     for file in files:
@@ -127,7 +161,7 @@ def test_a_cure_works(case: str, whole: Path, monkeypatch: pytest.MonkeyPatch) -
     for found in before.diagnostics:
         if not found.edits:
             continue
-        with followed(found, before.sources):
+        with followed(case, found, before.sources):
             left = check(f"{case}.yaml").diagnostics
         said = (str(found), found.cure, [str(one) for one in left])
         assert (

@@ -101,7 +101,7 @@ def _judge(found: tuple[Diagnostic, ...], sources: dict[str, Source]) -> None:
     shown = render_text(found, sources)
     if not shown.replace("\n", "").isprintable():
         raise Violation(f"not printable: {shown!r}")
-    json.dumps(to_json(found))
+    json.dumps(to_json(found, sources))
     if SECRET in shown:
         raise Violation("a secret is shown")
     for one in found:

@@ -78,7 +78,7 @@ def test_color_changes_nothing_but_escape_sequences() -> None:
 
 
 def test_json_has_the_promised_fields() -> None:
-    assert json.loads(json.dumps(to_json([UNKNOWN]))) == [
+    assert json.loads(json.dumps(to_json([UNKNOWN], {"t.yaml": SOURCE}))) == [
         {
             "file": "t.yaml",
             "line": 2,
@@ -87,6 +87,9 @@ def test_json_has_the_promised_fields() -> None:
             "code": "S101",
             "message": "unknown key `horizont` in a scenario; did you mean `horizon`?",
             "hint": "a number",
+            "edits": [
+                {"file": "t.yaml", "line": 2, "column": 1, "end_line": 2, "end_column": 9, "text": "horizon"}
+            ],
         }
     ]
 

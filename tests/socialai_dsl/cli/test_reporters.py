@@ -46,8 +46,11 @@ def test_json_is_an_array_of_findings() -> None:
         "code": "S101",
         "message": "unknown key `horizn`; did you mean `horizon`?",
         "hint": None,
+        "edits": [
+            {"file": "a.yaml", "line": 2, "column": 1, "end_line": 2, "end_column": 7, "text": "horizon"}
+        ],
     }
-    assert (second["severity"], second["hint"]) == ("warning", "remove it")
+    assert (second["severity"], second["hint"], second["edits"]) == ("warning", "remove it", [])
 
 
 def test_github_annotations_are_escaped() -> None:
@@ -64,6 +67,18 @@ def test_sarif_has_rules_and_regions() -> None:
     region = first["locations"][0]["physicalLocation"]["region"]
     assert region == {"startLine": 2, "startColumn": 1, "endColumn": 7}
     assert second["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == "b%2Cc%3Ad.yaml"
+
+
+def test_sarif_has_the_changes_that_cure_a_finding() -> None:
+    (run,) = json.loads(report("sarif"))["runs"]
+    (fix,), *others = (result.get("fixes") for result in run["results"])
+    assert others == [None], "there is advice alone"
+    (change,) = fix["artifactChanges"]
+    (replacement,) = change["replacements"]
+    assert fix["description"] == {"text": "write `horizon`"}
+    assert change["artifactLocation"] == {"uri": "a.yaml"}
+    region = {"startLine": 2, "startColumn": 1, "endLine": 2, "endColumn": 7}
+    assert replacement == {"deletedRegion": region, "insertedContent": {"text": "horizon"}}
 
 
 def test_junit_has_a_case_for_each_file() -> None:
