@@ -14,11 +14,12 @@ import pytest
 import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli import main
-from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
+from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Op, TypeColumn
 from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
+from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel
 from socialai_dsl.schema.scenario import SlotType
 from socialai_dsl.semantics.words import RESERVED, SIGNATURES
 from socialai_dsl.vocabulary import COLORS, DIRECTIONS, PRIMITIVES

@@ -10,12 +10,11 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
-from socialai_dsl.authoring.language_schema import FILES
 from socialai_dsl.authoring.names import Name, declared, frame_of, last_key, meant, part_at, visible
-from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
+from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, holds_expressions, literals, model_at
-from socialai_dsl.schema.files import ScenarioFile
+from socialai_dsl.schema.files import ScenarioFile, model_of_file
 from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.dialogues import ENDS
 from socialai_dsl.semantics.signatures import Signature
@@ -326,11 +325,7 @@ def _ids(data: Data) -> list[str]:
 
 def _root(data: Data) -> type[BaseModel] | None:
     """The model of a whole file."""
-    if not isinstance(data, dict):
-        return None
-    if "library" in data:
-        return GrammarLibrary if data["library"] == "grammars" else ObjectLibrary
-    return next((models[0] for kind, models in FILES.items() if kind in data), None)
+    return model_of_file(data) if isinstance(data, dict) else None
 
 
 def _model_of(data: Data, path: DataPath) -> Any:

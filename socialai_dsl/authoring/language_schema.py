@@ -15,32 +15,11 @@ from typing import Any, Final
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from socialai_dsl.library import GrammarLibrary, ObjectLibrary
-from socialai_dsl.schema.files import (
-    CurriculumFile,
-    ExperimentFile,
-    NpcFile,
-    ScenarioFile,
-    SuiteFile,
-    TestsFile,
-    VariantFile,
-)
+from socialai_dsl.schema.files import FILES
 
 Schema = dict[str, Any]
 
 _SHIPPED: Final = Path(__file__).with_name("language.schema.json")
-
-FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
-    "scenario": (ScenarioFile,),
-    "npc": (NpcFile,),
-    "suite": (SuiteFile,),
-    "variant": (VariantFile,),
-    "library": (ObjectLibrary, GrammarLibrary),
-    "experiment": (ExperimentFile,),
-    "curriculum": (CurriculumFile,),
-    "tests_of": (TestsFile,),
-}
-"""The key that says the kind of a file -> the models of such files."""
 
 _ANY_VALUE: Final = "AnyValue"
 _PARAMETER: Final = "WholeParameter"

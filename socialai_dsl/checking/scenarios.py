@@ -16,10 +16,11 @@ from socialai_dsl.diagnostics import (
     advice_on,
     did_you_mean,
 )
-from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
+from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader.patches import Edit, let_play
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning

@@ -17,6 +17,9 @@ import yaml
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.yaml_errors import explain
+from socialai_dsl.schema.annotations import held_at, texts_by_key
+from socialai_dsl.schema.files import FILES, model_of_file
+from socialai_dsl.schema.holds import TEXTS
 from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style, TextEdit
 
 MAX_FILE_BYTES: Final = 1 << 20
@@ -267,79 +270,29 @@ def _refused(text: str, reading: str, instead: str | None = None, otherwise: str
     return Plain(text, "S003", f"`{text}` is {reading}", instead, also)
 
 
-_TEXTS: Final = frozenset(
-    "say hears templates about notes note skills instructions name state goto goto_now".split()
-)
-"""Keys of the language whose values are texts or names of states."""
-
-_PROSE: Final = frozenset("about notes note skills instructions".split())
-"""Texts for people, for which `null` says that there is none."""
-
-_AUTHORS: Final = frozenset(
-    "objects let define state tables memory params frames slots states roles cast set beliefs".split()
-)
-"""Keys of the language below which the keys are words of the author."""
-
 _NOTHING: Final = ("", "~")
-_STEP: Final = re.compile(r"[^.\[\]]+")
 
 
-def value_at(path: DataPath, text: str) -> Scalar:
-    """The value of a plain word where a text may stand; None where YAML's own reading holds.
+def read_in_place(root: Node, path: DataPath, plain: Plain, text: str) -> Plain:
+    """The value of a plain word at its place in a document: where a text may stand, the text itself.
 
     Args:
-        path: where in its file it stands.
+        root: the document.
+        path: where in it the word stands.
+        plain: what YAML takes it for.
         text: the word as it is written.
     """
     if text in _NOTHING:
-        return None
-    keys = _keys(path)
-    if _is_text(keys):
-        return None if text == "null" and keys[-1] in _PROSE else text
-    kept = _kept(keys)
-    if kept:
-        value = read_plain(text).value
-        return value if type(value) in kept else text
-    return None
-
-
-def _keys(path: DataPath) -> list[str]:
-    """The keys on the way to a value, from the root of the scenario; the key of a patch is such a way itself."""
-    keys: list[str] = []
-    for step in path:
-        if isinstance(step, str):
-            keys = _STEP.findall(step) if "." in step else [*keys, step]
-    return keys
-
-
-def _is_text(keys: list[str]) -> bool:
-    """Whether nothing but a text, or a name, can stand there."""
-    match keys:
-        case [*_, "frames", _, "start"] | [*_, "probes", _, "ask" | "answers"]:
-            return True
-        case [*_, "published", "who" | "did" | "source"]:
-            return True
-        case ["tests", _, "play", "do"] | ["tests", _, "play", "state", _]:
-            return True
-        case ["instructions", _] | ["set" | "add", "instructions"] | ["set" | "add", "instructions", _]:
-            return True
-        case [*_, parent, _] if parent in _AUTHORS:
-            return False
-        case [*_, key]:
-            return key in _TEXTS
-    return False
-
-
-def _kept(keys: list[str]) -> tuple[type, ...]:
-    """Kinds of values that can stand there beside texts; none where no text can."""
-    match keys:
-        case [*_, "with", _] | [*_, "tables", _, _]:
-            return (bool, int)
-        case [*_, "grammar", "nouns"] | [*_, "grammars", _, "nouns"]:
-            return (int,)
-        case [*_, "grammar", "slots", _] | [*_, "grammars", _, "slots", _]:
-            return (int,)
-    return ()
+        return plain
+    keys = root.children if isinstance(root.children, dict) else {}
+    file = {key: part.value for key, part in keys.items()}
+    known = model_of_file(file)
+    possible = [known] if known is not None else [model for models in FILES.values() for model in models]
+    held = next(filter(None, (held_at(model, path) for model in possible)), None)
+    held = held or texts_by_key().get(next((s for s in reversed(path) if isinstance(s, str)), ""))
+    if held is None or held.kind not in TEXTS or (held.kind == "prose" and text == "null"):
+        return plain
+    return Plain(plain.value if type(plain.value) in held.beside else text)
 
 
 # Only the event stream of libyaml is used: its composer and PyYAML's are recursive and can be made to crash.
@@ -379,6 +332,7 @@ def _parse(source: Source) -> Node:
     # PyYAML's own parser leaks ValueError and OverflowError for some escapes.
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         builder.found.add(explain(error, source))
+    builder.read_plain_words()
     builder.found.raise_errors({source.name: source})
     return builder.root
 
@@ -429,6 +383,7 @@ class _Builder:
         self._stack: list[_Frame] = []
         self._events = 0
         self._documents = 0
+        self._unread: list[tuple[DataPath, Node, Plain]] = []
         self._take: dict[type, Callable[[Any], None]] = {
             yaml.ScalarEvent: self._scalar,
             yaml.MappingStartEvent: lambda event: self._open({}, event, Style.MAPPING),
@@ -513,20 +468,25 @@ class _Builder:
         if style is not Style.PLAIN:
             self._value(text, event, style)
             return
-        meant = value_at(self._path(), text)
-        if meant is not None:
-            self._value(meant, event, style)
-            return
-        plain = read_plain(text)
-        if plain.code:
-            place = self.source.edit(event.start_mark.index, event.end_mark.index, plain.instead or "")
-            hint = (
-                cures.write(plain.instead, place, plain.also)
-                if plain.instead is not None
-                else plain.also or None
-            )
-            self._error(plain.code, plain.message, self._span(event), hint)
-        self._value(plain.value, event, style)
+        plain, path = read_plain(text), self._path()
+        node = self._value(text, event, style)
+        if plain != Plain(text):
+            self._unread.append((path, node, plain))
+
+    def read_plain_words(self) -> None:
+        """Give each plain word its value, now that it is known what kind of file it is."""
+        for path, node, plain in self._unread:
+            span = node.span
+            read = read_in_place(self.root, path, plain, str(node.value))
+            node.value, node.span = read.value, replace(span, read=read.value)
+            if read.code:
+                place = self.source.edit(span.start, span.end, read.instead or "")
+                hint = (
+                    cures.write(read.instead, place, read.also)
+                    if read.instead is not None
+                    else read.also or None
+                )
+                self._error(read.code, read.message, span.value, hint)
 
     def _key(self, text: str, style: Style, span: Span) -> None:
         frame = self._stack[-1]
@@ -556,9 +516,11 @@ class _Builder:
         assert frame.key is not None, "internal: a value without a key"
         return (*frame.path, frame.key)
 
-    def _value(self, value: Scalar, event: Any, style: Style) -> None:
+    def _value(self, value: Scalar, event: Any, style: Style) -> Node:
         """Put a scalar where the next value belongs."""
-        self._put(self._node(self._span(event), event, style, value))
+        node = self._node(self._span(event), event, style, value)
+        self._put(node)
+        return node
 
     def _node(self, place: Span, event: Any, style: Style, value: Scalar = None) -> Node:
         """What an event begins, for the place where the next value belongs."""

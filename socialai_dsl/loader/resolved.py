@@ -22,10 +22,8 @@ from socialai_dsl.loader.reader import (
     shipped_folder,
     yaml_files,
 )
+from socialai_dsl.schema.files import FILES
 from socialai_dsl.source import DataPath, Node, Source, Span
-
-KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment", "curriculum", "tests_of")
-"""The kinds of file; exactly one of these keys is present."""
 
 TESTS: Final = ".tests.yaml"
 """The end of the name of a file with tests of the scenario beside it."""
@@ -180,7 +178,7 @@ class Build:
 
     Attributes:
         tree: its data; changed in place.
-        kind: one of `KINDS`.
+        kind: one of `FILES`.
         name: canonical name, with the variants applied so far.
         path: the file that was named, resolved.
         lineage: itself and what it is a variant of, nearest first.
@@ -327,18 +325,18 @@ def _kind_of(library: Library, root: Node) -> str:
         message = f"a scenario file is a mapping of keys; this one is {root.kind}"
         hint = "it starts with a key such as `scenario: name`"
         raise library.error("S108", message, root.value_span(), hint=hint)
-    kinds = [key for key in root.children if key in KINDS]
+    kinds = [key for key in root.children if key in FILES]
     if len(kinds) == 1:
         return kinds[0]
     if kinds:
         message = f"a file has only one of `{kinds[0]}` and `{kinds[1]}`"
         raise library.error("S107", message, root.children[kinds[1]].key_span())
     for key, part in root.children.items():
-        near = did_you_mean(key, KINDS)
+        near = did_you_mean(key, FILES)
         if near:
             message = f"unknown key `{key}`, and no key says what this file is"
             raise library.error("S108", message, part.key_span(), suggestion=near)
-    hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in KINDS)
+    hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in FILES)
     raise library.error("S108", "no key says what this file is", root.value_span(), hint=hint)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
-from types import UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from functools import cache
+from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -19,7 +20,8 @@ from socialai_dsl.schema.experiment import (
     Settings,
     Transfer,
 )
-from socialai_dsl.schema.files import TestsFile
+from socialai_dsl.schema.files import FILES, TestsFile
+from socialai_dsl.schema.holds import TEXTS, Holds, Kind, branches, said_of
 from socialai_dsl.schema.scenario import (
     Belief,
     CastMember,
@@ -119,10 +121,21 @@ _FAMILIES: Final = (
 """Models of the files that are not about scenarios."""
 
 
+@cache
+def fields_of(model: type[BaseModel]) -> dict[str, Any]:
+    """Each key of a mapping of this kind, as authors write it, and the annotation of its value."""
+    return {
+        field.alias or name: Annotated[field.annotation, *field.metadata]
+        if field.metadata
+        else field.annotation
+        for name, field in model.model_fields.items()
+    }
+
+
 def keys_of(model: type) -> list[str]:
     """The keys a mapping of this kind can have, as authors write them."""
     assert issubclass(model, BaseModel), "internal: only models have keys"
-    return [field.alias or name for name, field in model.model_fields.items()]
+    return [*fields_of(model)]
 
 
 def home_of(key: str, owner: type | None) -> str | None:
@@ -159,11 +172,8 @@ def _step(annotation: Any, step: str | int) -> Any:
     for part in branches(annotation):
         origin, arguments = get_origin(part), get_args(part)
         if isinstance(part, type) and issubclass(part, BaseModel):
-            for name, field in part.model_fields.items():
-                if step in (name, field.alias):
-                    return (
-                        Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
-                    )
+            if step in (fields := fields_of(part)):
+                return fields[step]
             if part is Value and isinstance(step, str):
                 return Values
         elif origin is dict and isinstance(step, str):
@@ -177,16 +187,95 @@ def _step(annotation: Any, step: str | int) -> Any:
     return Any
 
 
-def branches(annotation: Any) -> Iterator[Any]:
-    """The branches of a union, without annotations around them."""
-    origin = get_origin(annotation)
-    if origin is Annotated:
-        yield from branches(get_args(annotation)[0])
-    elif origin in (Union, UnionType):
-        for branch in get_args(annotation):
-            yield from branches(branch)
-    else:
+# -- what a key holds ----------------------------------------------------------------------------------------
+
+
+def holds_of(annotation: Any) -> Holds | None:
+    """What a place with this annotation holds; None if nothing says so."""
+    said = said_of(annotation)
+    if said is not None:
+        return said
+    for part in branches(annotation):
+        if get_origin(part) in (tuple, list):
+            return holds_of(get_args(part)[0])
+        if get_origin(part) is Literal:
+            return Holds("word")
+        if get_origin(part) is dict or (isinstance(part, type) and issubclass(part, BaseModel)):
+            return Holds("section")
+        if part in (int, float, bool):
+            return Holds("truth" if part is bool else "number")
+    return None
+
+
+def held_at(model: type[BaseModel], path: DataPath) -> Holds | None:
+    """What the key at a path of a file holds, or that of the list that the path leads into; None if it is unknown.
+
+    The path of a patch leads on into the scenario or suite that is patched.
+    """
+    annotation: Any = model
+    held: Holds | None = Holds("section")
+    for step in path:
+        below = _step(annotation, step)
+        if isinstance(step, int):  # where each of a group has its own, the model has that of one
+            held = holds_of(below) or held
+            annotation = annotation if below is Any else below
+        elif held is not None and held.kind == "patch":
+            annotation = _patched(step)
+            held = holds_of(annotation)
+        else:
+            annotation, held = below, holds_of(below)
+    return held
+
+
+_STEP: Final = re.compile(r"\[[^\[\]]*\]|[^.\[\]]+")
+
+
+def _patched(path: str) -> Any:
+    """The annotation of what a patch changes, whose path is a text such as `outcome[0].success`."""
+    steps = tuple(0 if step.startswith("[") else step for step in _STEP.findall(path))
+    found = (annotation_at(model, steps) for model in (Scenario, Suite))
+    return next((annotation for annotation in found if annotation is not Any), Any)
+
+
+def keys_that_hold(model: type[BaseModel], *kinds: Kind) -> list[str]:
+    """The keys of a model that hold something of these kinds."""
+    held = {key: holds_of(annotation) for key, annotation in fields_of(model).items()}
+    return [key for key, holds in held.items() if holds is not None and holds.kind in kinds]
+
+
+@cache
+def texts_by_key() -> dict[str, Holds]:
+    """What a key holds that is a text in every model that has it, for one that stands in a wrong place."""
+    found: dict[str, Holds] = {}
+    others: set[str] = set()
+    for model in models():
+        for key, annotation in fields_of(model).items():
+            held = holds_of(annotation)
+            if held is not None and held.kind in TEXTS:
+                found.setdefault(key, held)
+            elif held is not None and held.kind != "section":
+                others.add(key)
+    return {key: held for key, held in found.items() if key not in others}
+
+
+@cache
+def models() -> tuple[type[BaseModel], ...]:
+    """The model of every file and of every part of one."""
+    found: dict[type[BaseModel], None] = {}
+    waiting = [model for files in FILES.values() for model in files]
+    while waiting:
+        model = waiting.pop()
+        if model not in found:
+            found[model] = None
+            waiting += [part for annotation in fields_of(model).values() for part in _models_in(annotation)]
+    return tuple(found)
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
 
 
 def holds_expressions(annotation: Any) -> bool:

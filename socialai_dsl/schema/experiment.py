@@ -16,16 +16,20 @@ from pydantic import (
 )
 
 from socialai_dsl.errors import first_mistake
-from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many
+from socialai_dsl.schema.holds import Holds, branches
+from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many, as_written
 from socialai_dsl.schema.suite import MemberName
 from trainer.config import BONUS_SCALES, FLAGS, HYPER, MOST_FRAMES, RunConfig
 
 Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""
 
-Labels = Annotated[
-    ListOf[Label],
-    BeforeValidator(_one_or_many, json_schema_input_type=Label | tuple[Label, ...]),
+Title = Annotated[Label, as_written(Label | float | bool), Holds("label")]
+"""The same where it is a value."""
+
+Titles = Annotated[
+    ListOf[Title],
+    BeforeValidator(_one_or_many, json_schema_input_type=Title | tuple[Title, ...]),
 ]
 
 NETS: Final = ("fast", "relations", "speakers", "paper", "paper-reference", "paper-reference-tuned")
@@ -48,7 +52,7 @@ class Reference(Model):
         "sample", description="whether `std` divides by n − 1 (sample, the default) or by n (population)"
     )
     note: Prose | None = Field(None, description="a remark for the comparison")
-    source: str | None = Field(None, description="the source of the figure")
+    source: Prose | None = Field(None, description="the source of the figure")
 
 
 class Transfer(Model):
@@ -75,6 +79,8 @@ def _made_optional(names: Iterable[str]) -> dict[str, Any]:
         annotation: Any = _WORDS.get(name, field.annotation)
         if annotation is float or annotation == float | None:
             annotation = float | int
+        if str in branches(annotation):
+            annotation = Annotated[annotation, Holds("spelt")]
         optional: Any = annotation | None
         bounded = Annotated[optional, *field.metadata] if field.metadata else optional
         fields[name] = (bounded, Field(None, description=field.description))
@@ -111,10 +117,10 @@ class Settings(_RunOptions):
     scenario: MemberName | None = Field(
         None, description="a shipped name, or a path relative to this file; with variants and parameters"
     )
-    variants: ListOf[Word] | None = Field(
+    variants: ListOf[Annotated[Word, Holds("file")]] | None = Field(
         None, description="variants applied to the scenario and to its tests"
     )
-    agent: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
+    agent: Annotated[str, StringConstraints(min_length=1, max_length=1000), Holds("spelt")] | None = Field(
         None,
         description="ppo (default), random, oracle, shipped:NAME, or a checkpoint or run folder, relative to this file",
     )
@@ -149,18 +155,19 @@ def one_setting(name: str, value: str | int) -> Settings | str:
 class Condition(Settings):
     """One cell of the experiment: an agent and a scenario, run once for each seed."""
 
-    name: Label = Field(description="the condition's name; each has its own")
-    group: Label | None = Field(None, description="conditions that are shown together")
-    row: Label | None = Field(None, description="its row in the group's table; default its name")
-    column: Label | None = Field(None, description="its column in the group's table; default the agent")
+    name: Title = Field(description="the condition's name; each has its own")
+    group: Title | None = Field(None, description="conditions that are shown together")
+    row: Title | None = Field(None, description="its row in the group's table; default its name")
+    column: Title | None = Field(None, description="its column in the group's table; default the agent")
 
 
 AxisValue = Annotated[
-    Annotated[str | int, Tag("word")] | Annotated[Settings, Tag("mapping")], Discriminator(_is_mapping)
+    Annotated[str | int, Tag("word"), Holds("value")] | Annotated[Settings, Tag("mapping")],
+    Discriminator(_is_mapping),
 ]
 
 Axis = Annotated[
-    Annotated[ListOf[str | int], Field(min_length=1, max_length=1000), Tag("list")]
+    Annotated[ListOf[Annotated[str | int, Holds("value")]], Field(min_length=1, max_length=1000), Tag("list")]
     | Annotated[dict[Label, AxisValue], Field(min_length=1, max_length=1000), Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
 ]
@@ -173,7 +180,7 @@ class Grid(Model):
     grid: dict[Label, Axis] = Field(
         min_length=1, max_length=8, description="axis: values; the axis `scenario`, for example"
     )
-    group: Label | None = Field(None, description="conditions that are shown together")
+    group: Title | None = Field(None, description="conditions that are shown together")
     set: Settings | None = Field(None, description="settings of all of them")
 
 
@@ -193,7 +200,7 @@ ConditionList = Annotated[ListOf[ConditionOrGrid], Field(max_length=1000)]
 class Override(Model):
     """Other settings for some of the conditions."""
 
-    where: dict[Label, Labels] = Field(
+    where: dict[Label, Titles] = Field(
         min_length=1, description="name, row, column, group or an axis: its value, or a list of values"
     )
     set: Settings = Field(description="their settings")
@@ -226,5 +233,7 @@ class Experiment(Model):
     overrides: OverrideList = Field(
         (), description="other settings for some of the conditions; later ones win"
     )
-    profile: Word | None = Field(None, description="the profile that is used where none is named")
+    profile: Annotated[Word, Holds("name", "profiles")] | None = Field(
+        None, description="the profile that is used where none is named"
+    )
     profiles: dict[Word, Profile] = Field(default_factory=dict, description="sizes in which it can be run")

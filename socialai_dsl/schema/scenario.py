@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic.config import JsonDict
 
+from socialai_dsl.schema.holds import Holds
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
@@ -31,8 +32,18 @@ def _unchanged(value: Any) -> Any:
     return value
 
 
-Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
+Word = Annotated[
+    str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40), Holds("new name")
+]
 """A name that an author declares: letters, digits and underscores, not starting with a digit."""
+
+FrameName = Annotated[Word, Holds("name", "frames")]
+RoleName = Annotated[Word, Holds("name", "roles")]
+LetName = Annotated[Word, Holds("name", "let")]
+LookName = Annotated[Word, Holds("name", "looks")]
+TypeName = Annotated[Word, Holds("name", "types")]
+ObjectName = Annotated[str, Holds("name", "objects")]
+"""Names that are declared elsewhere; that of an object may have a number, `boxes[1]`."""
 
 LANGUAGE_TAG: Final = r"^[a-z]{2,3}(-[A-Z][a-z]{3})?(-([A-Z]{2}|[0-9]{3}))?$"
 """Language, perhaps script, perhaps country or region."""
@@ -48,17 +59,23 @@ Target = Annotated[
 ]
 """What `set` changes: a register, one of those for each of a group, `trust(speaker)`, or a look, `ann.mood`."""
 
-Expression = int | bool | str
+Expression = Annotated[int | bool | str, Holds("expression")]
 """The source of an expression; a bare number or truth value may be written without quotes."""
+
+Interval = Annotated[Expression, Holds("interval")]
+"""The source of an expression `a..b`, or of a number."""
+
+Activity = Annotated[str, Holds("activity")]
+Place = Annotated[str, Holds("place")]
 
 _Text = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 
 # The loader makes texts of plain numbers, `true` and `null` where a text is expected.
 _Null = Annotated[None, WithJsonSchema({"enum": [None]})]
-TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null)]
+TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null), Holds("text")]
 """A text that the agent or an NPC can say, possibly with <...> parts."""
 
-Prose = Annotated[str, as_written(str | float | bool)]
+Prose = Annotated[str, as_written(str | float | bool), Holds("prose")]
 """A text for people."""
 
 LanguageTag = Annotated[str, StringConstraints(pattern=LANGUAGE_TAG)]
@@ -66,19 +83,25 @@ LanguageTag = Annotated[str, StringConstraints(pattern=LANGUAGE_TAG)]
 
 NOT_BLANK: Final = r"\S"
 _Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=4000)]
-_Instruction = Annotated[_Told, as_written(_Told | float | bool)]
+_Instruction = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
 Instructions = Annotated[
     Annotated[_Instruction, Tag("text")]
     | Annotated[Annotated[dict[LanguageTag, _Instruction], Field(min_length=1)], Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "text"),
+    Holds("prose"),
 ]
 """A text for players, or one for each of several languages."""
 
-StateName = Annotated[Word, as_written(Word | bool | _Null)]
+StateName = Annotated[Word, as_written(Word | bool | _Null), Holds("state")]
 """The name of a state."""
 
-ExpressionOrText = Annotated[Expression, as_written(Expression | float | _Null)]
+ExpressionOrText = Annotated[
+    Expression, as_written(Expression | float | _Null), Holds("text", beside=(bool, int))
+]
 """The source of an expression, or a text."""
+
+SpeakerName = Annotated[ExpressionOrText, Holds("text")]
+"""The source of an expression, or the text of a name."""
 
 
 def _one_or_many(value: Any) -> Any:
@@ -99,17 +122,24 @@ Expressions = Annotated[
 ]
 """One expression, or a list of them."""
 
+Effect = Annotated[Expressions, Holds("effect")]
+"""One effect, or a list of them."""
+
+Places = Annotated[Expressions, Holds("place")]
+"""One place, or a list of them."""
+
 Texts = Annotated[
     ListOf[TextLine],
     BeforeValidator(_one_or_many, json_schema_input_type=TextLine | tuple[TextLine, ...]),
 ]
 """One text, or a list of them."""
 
-_ManyFillers = Annotated[tuple[TextLine | int, ...], Field(min_length=1, max_length=256)]
+_Filler = Annotated[TextLine | int, Holds("text", beside=(int,))]
+_ManyFillers = Annotated[tuple[_Filler, ...], Field(min_length=1, max_length=256)]
 Fillers = Annotated[
     _ManyFillers,
     BeforeValidator(_as_tuple),
-    BeforeValidator(_one_or_many, json_schema_input_type=TextLine | int | _ManyFillers),
+    BeforeValidator(_one_or_many, json_schema_input_type=_Filler | _ManyFillers),
 ]
 """What can stand in a slot of a grammar, one or a list."""
 
@@ -151,7 +181,7 @@ class Effects(Model):
     set: dict[Target, Expression] = Field(
         default_factory=dict, description="registers of the frame's `let`", examples=[{"trust(speaker)": 5}]
     )
-    cause: Expressions = Field((), description="effects on objects and on oneself, in order")
+    cause: Effect = Field((), description="effects on objects and on oneself, in order")
     say: TextLine | None = Field(
         None, description="a text to say; <...> puts a value in", examples=["The <exit.color> door"]
     )
@@ -178,7 +208,7 @@ class WorldRule(Model):
     chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
     once: bool = Field(False, description="once per episode")
     set: dict[Target, Expression] = Field(default_factory=dict, description="registers of `state`")
-    cause: Expressions = Field((), description="effects on objects and NPCs, in order")
+    cause: Effect = Field((), description="effects on objects and NPCs, in order")
     reward: int = Field(
         0, ge=-100, le=100, description="per cent of the success reward, added to the reward of the step"
     )
@@ -196,7 +226,7 @@ class ThenRule(Rule):
 class FirstRule(ThenRule):
     """A rule read before the body action, which it may choose itself."""
 
-    do: str | None = Field(
+    do: Activity | None = Field(
         None, description="an activity, in place of the state's", examples=["go_next_to(agent)"]
     )
 
@@ -207,7 +237,7 @@ class State(Model):
     first: ListOf[FirstRule] = Field(
         (), description="rules read before moving; the first that holds takes effect"
     )
-    do: str | None = Field(None, description="an activity; default stay", examples=["face(agent)"])
+    do: Activity | None = Field(None, description="an activity; default stay", examples=["face(agent)"])
     then: ListOf[ThenRule] = Field(
         (), description="rules read after moving; the first that holds takes effect"
     )
@@ -222,7 +252,9 @@ class Step(Effects):
     """One entry of `steps`: an activity until it is finished, then its effects."""
 
     state: StateName | None = Field(None, description="a name for npc.is(name)")
-    do: str | None = Field(None, description="an activity, until it is finished", examples=["go_to(exit)"])
+    do: Activity | None = Field(
+        None, description="an activity, until it is finished", examples=["go_to(exit)"]
+    )
     until: Expression | None = Field(None, description="a condition that finishes the step")
     for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
     when: Expression | None = Field(
@@ -249,7 +281,7 @@ class Register(Model):
     """A register with a range to which its values are clipped, or one for each of a group."""
 
     start: Expression = Field(description="its value at first; `none`: nothing yet")
-    range: Expression | None = Field(
+    range: Interval | None = Field(
         None, description="a..b, to which its values are clipped", examples=["0..10"]
     )
     for_: Expression | None = Field(
@@ -307,12 +339,12 @@ class Frame(Model):
 class Role(Model):
     """A part that a member of the cast plays: where it is put, and what drives it if it is an NPC."""
 
-    place: str | None = Field(None, description="default anywhere")
+    place: Place | None = Field(None, description="default anywhere")
     at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
-    frame: Word | None = Field(None, description="the frame an NPC in this role follows")
+    frame: FrameName | None = Field(None, description="the frame an NPC in this role follows")
 
 
 class Source(Model):
@@ -344,20 +376,20 @@ class Belief(Model):
 class Character(Model):
     """An inhabitant of the room: its appearance, place and behaviour."""
 
-    role: Word | None = Field(None, description="the part it plays")
-    kind: Word | None = Field(None, description="its appearance; default peer")
-    name: ExpressionOrText | None = Field(
+    role: RoleName | None = Field(None, description="the part it plays")
+    kind: Annotated[Word, Holds("spelt")] | None = Field(None, description="its appearance; default peer")
+    name: SpeakerName | None = Field(
         None, description="the speaker's name before its lines; default its key, capitalised"
     )
     color: Expression | None = Field(None, description="default random")
-    place: str | None = Field(None, description="default anywhere")
+    place: Place | None = Field(None, description="default anywhere")
     at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
     earshot: Earshot | None = Field(None, description="the reach of its voice")
-    frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
+    frame: FrameName | None = Field(None, description="the frame it follows; default none: it stays")
     with_: dict[Word, ExpressionOrText] = Field(
         default_factory=dict, alias="with", description="fills the slots"
     )
@@ -384,11 +416,13 @@ class CastMember(Character):
     then from the defaults of the language.
     """
 
-    one_of: Annotated[tuple[Npc, ...] | None, BeforeValidator(_as_tuple), as_written(str | list[str])] = (
-        Field(
-            None,
-            description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *",
-        )
+    one_of: Annotated[
+        tuple[Npc, ...] | None,
+        BeforeValidator(_as_tuple),
+        as_written(str | list[str]),
+        Holds("file"),
+    ] = Field(
+        None, description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *"
     )
 
     def over(self, defaults: Character | Role) -> CastMember:
@@ -409,13 +443,13 @@ class CastGroup(CastMember):
     """
 
     count: int = Field(ge=1, le=16, description="the size of the group")
-    name: Annotated[Expression | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
+    name: Annotated[SpeakerName | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
         None, description="what precedes its lines; a list gives one each"
     )
     color: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(
         None, description="default random; a list gives one each"
     )
-    place: Annotated[str | None, as_written(str | list[str])] = Field(
+    place: Annotated[Place | None, as_written(str | list[str])] = Field(
         None, description="default anywhere; a list gives one each"
     )
     facing: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(
@@ -443,12 +477,10 @@ class WrittenCast(Model):
 class Room(Model):
     """A walled rectangle; sizes count the walls. Width and height are drawn independently from `size`."""
 
-    size: Expression | None = Field(
-        None, description="n, or a..b: both width and height", examples=["5..8", 8]
-    )
-    width: Expression | None = Field(None, description="width in cells, walls included")
-    height: Expression | None = Field(None, description="height in cells, walls included")
-    build: ListOf[dict[Word, str]] = Field(
+    size: Interval | None = Field(None, description="n, or a..b: both width and height", examples=["5..8", 8])
+    width: Interval | None = Field(None, description="width in cells, walls included")
+    height: Interval | None = Field(None, description="height in cells, walls included")
+    build: ListOf[dict[TypeName, Place]] = Field(
         (),
         description="fixed things in place of floor, as {type: place}",
         examples=[[{"lava": "column(W // 2)"}]],
@@ -462,9 +494,9 @@ class Room(Model):
 class ObjectGroup(Model):
     """An object, or with `count` (or a list in `at`) a group of them."""
 
-    type: Word = Field(description="an object type of the prelude", examples=["door"])
+    type: TypeName = Field(description="an object type of the prelude", examples=["door"])
     count: int | None = Field(None, ge=1, le=16, description="the size of the group")
-    place: Expressions | None = Field(None, description="where it is drawn; a list gives one each")
+    place: Places | None = Field(None, description="where it is drawn; a list gives one each")
     at: (
         Annotated[
             tuple[Expression, ...] | tuple[tuple[Expression, ...], ...],
@@ -481,7 +513,7 @@ class ObjectGroup(Model):
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
     dark: bool = Field(False, description="the agent sees no difference between its statuses")
     carryable: bool = Field(False, description="it can be picked up, carried and given")
-    inside: str | None = Field(
+    inside: ObjectName | None = Field(
         None, description="the object it lies in, unseen until that is opened, or who carries it at first"
     )
     exclusive: bool = Field(
@@ -491,11 +523,11 @@ class ObjectGroup(Model):
     timer: int | None = Field(
         None, ge=1, le=10_000, description="steps after which its active status expires"
     )
-    opens: str | None = Field(
+    opens: ObjectName | None = Field(
         None, description="the object that is open while this is active, or a group in the same order"
     )
-    pushed_by: Word | None = Field(None, description="the only type of object that can push it")
-    unlocks: str | None = Field(
+    pushed_by: TypeName | None = Field(None, description="the only type of object that can push it")
+    unlocks: ObjectName | None = Field(
         None, description="the object that is unlocked while this is pressed, or a group in the same order"
     )
 
@@ -519,18 +551,26 @@ class Observe(Model):
         description="marked: each line in `tokens` begins with a mark of who says it, `<Ann>`, which is no word",
     )
     own_voice: bool = Field(False, description="whether the agent hears itself")
-    channels: ListOf[Channel | Word] | None = Field(
+    channels: ListOf[Channel | LookName] | None = Field(
         None,
         description="the first 4, 6 or 8, carrying, looks; default: 4, carrying where something can be carried, looks",
         examples=[["type", "color", "status", "orientation", "carrying"]],
     )
-    tone: Word | None = Field(
+    tone: LookName | None = Field(
         None, description="a look of NPCs, whose word is heard before what they say: `(angry) Great idea.`"
     )
     directions: Literal["absolute", "egocentric"] = Field(
         "absolute",
         description="how the image shows the directions of NPCs; egocentric: as seen from the agent",
     )
+
+
+SlotMark = Annotated[
+    str,
+    StringConstraints(pattern=r"^<[A-Za-z_][A-Za-z0-9_]*>$", max_length=42),
+    Holds("spelt"),
+]
+"""A slot of the grammar as templates write it."""
 
 
 class UtteranceGrammar(Model):
@@ -542,7 +582,7 @@ class UtteranceGrammar(Model):
         description="texts; <noun> stands for each noun, <slot> for all that a slot can be",
         examples=[["Where is <noun>"]],
     )
-    nouns: ListOf[TextLine | int] = Field(
+    nouns: ListOf[_Filler] = Field(
         (),
         min_length=1,
         max_length=256,
@@ -555,24 +595,29 @@ class UtteranceGrammar(Model):
         description="in place of `nouns`, name: the values of <name>: words, things, members, `colors`, 1..6",
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
     )
-    to: Annotated[str, StringConstraints(pattern=r"^<[A-Za-z_][A-Za-z0-9_]*>$", max_length=42)] | None = (
-        Field(
-            None,
-            description="the slot whose member of the cast is addressed by what is said",
-            examples=["<whom>"],
-        )
+    to: SlotMark | None = Field(
+        None,
+        description="the slot whose member of the cast is addressed by what is said",
+        examples=["<whom>"],
     )
 
 
 # -- claims and probes, which playing never reads ------------------------------------------------------------
 
 
-_Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
+MemberName = Annotated[
+    str,
+    StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40),
+    Holds("name", "cast"),
+]
+"""A member of the cast; those of a group are numbered from 0: `peers[0]`."""
+
 Names = Annotated[
-    ListOf[_Name],
+    ListOf[MemberName],
     Field(min_length=1),
     BeforeValidator(
-        _one_or_many, json_schema_input_type=_Name | Annotated[tuple[_Name, ...], Field(min_length=1)]
+        _one_or_many,
+        json_schema_input_type=MemberName | Annotated[tuple[MemberName, ...], Field(min_length=1)],
     ),
 ]
 """One member or group of the cast, or a list of them."""
@@ -581,7 +626,7 @@ Names = Annotated[
 class OnlyThrough(Model):
     """A draw that only these members reveal."""
 
-    draw: Word = Field(description="a `let` whose values are tried against each other")
+    draw: LetName = Field(description="a `let` whose values are tried against each other")
     by: Names = Field(description="members of the cast whose cues may reveal it")
 
 
@@ -597,7 +642,9 @@ class Property(Model):
     script: Literal["perceives"] | None = Field(
         None, description="the variant `oracle` acts on its perceptions alone"
     )
-    rival: Word | None = Field(None, description="a strategy of `rivals`, which must not succeed too often")
+    rival: Annotated[Word, Holds("name", "rivals")] | None = Field(
+        None, description="a strategy of `rivals`, which must not succeed too often"
+    )
     at_most: Probability | None = Field(
         None, description="for `rival`: the share of rooms that it may solve at most"
     )
@@ -610,7 +657,7 @@ class Property(Model):
     share: Probability | None = Field(
         None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
     )
-    draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")
+    draw: LetName | None = Field(None, description="for `needs`: the `let` that has to be guessed")
 
 
 class Probe(Model):
@@ -642,7 +689,7 @@ class DialogueRoom(Model):
     test_episode: int | None = Field(
         None, ge=0, description="an episode of the fixed test set, in place of a seed"
     )
-    layout: str | dict[str, JsonValue] | None = Field(
+    layout: Annotated[str | dict[str, JsonValue], Holds("layout")] | None = Field(
         None,
         description="a known room, in the words of layouts, or the JSON file with one",
         examples=[{"agent": {"at": [2, 3], "facing": "up"}, "let": {"exit": "doors[1]"}}],
@@ -652,17 +699,17 @@ class DialogueRoom(Model):
 class DialogueStep(Model):
     """What the agent does, and what must be so then."""
 
-    do: Texts = Field(
+    do: Annotated[Texts, Holds("act")] = Field(
         (),
         description="an act or several, as typed in `socialai play`; default: nothing is done yet",
         examples=["Where is the exit", ["forward", "forward How are you"]],
     )
-    hears: Texts = Field(
+    hears: Annotated[Texts, Holds("heard")] = Field(
         (),
         description="all that is heard meanwhile, in order; <...> is a value; `any`: whatever it is; default: nothing",
         examples=["Gandalf: I am fine."],
     )
-    state: dict[_Name, StateName] = Field(
+    state: dict[MemberName, StateName] = Field(
         default_factory=dict,
         description="member of the cast: the state of its frame after the acts",
         examples=[{"wizard": "acquainted"}],
@@ -679,14 +726,14 @@ class DialogueTest(Model):
     """A dialogue that must go as written; `socialai test` plays it."""
 
     about: Prose | None = Field(None, description="one sentence for people")
-    of: str | None = Field(
+    of: Annotated[str, Holds("spelt")] | None = Field(
         None, description="variants and parameters of the scenario that is played", examples=["+unsocial?n=2"]
     )
     room: DialogueRoom = Field(DialogueRoom(), description="the room; default: drawn")
     play: ListOf[DialogueStep] = Field(
         min_length=1, max_length=1000, description="what is done, step by step"
     )
-    ends: str | None = Field(
+    ends: Annotated[str, Holds("ending")] | None = Field(
         None,
         description="how the last act ends the episode: success, failure, deadly, timeout, an outcome's id, or `open`",
     )
@@ -696,12 +743,6 @@ class DialogueTest(Model):
 
 
 # -- the file ------------------------------------------------------------------------------------------------
-
-
-MemberName = Annotated[
-    str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)
-]
-"""A member of the cast; those of a group are numbered from 0: `peers[0]`."""
 
 
 class Outcome(Model):
@@ -718,7 +759,9 @@ class Outcome(Model):
 class Reward(Model):
     """The reward: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
 
-    success: str = Field("linear(0.9)", description="linear(s), the part s that is lost by the horizon")
+    success: Annotated[str, Holds("spelt")] = Field(
+        "linear(0.9)", description="linear(s), the part s that is lost by the horizon"
+    )
     each_step: Annotated[
         float, Field(ge=-1, le=1), BeforeValidator(lambda v: float(v) if type(v) is int else v)
     ] = Field(0.0, description="added to the reward of every step")
@@ -750,11 +793,14 @@ class Memory(Model):
     )
 
 
+PlainValue = Annotated[int | bool | float | str, Holds("value")]
+
+
 class Parameter(Model):
     """A parameter of the file, used as $name."""
 
-    default: int | bool | float | str = Field(description="its value unless `?name=value` gives another")
-    values: list[int | bool | float | str] | dict[str, int | bool | float | str] | None = Field(
+    default: PlainValue = Field(description="its value unless `?name=value` gives another")
+    values: list[PlainValue] | dict[str, PlainValue] | None = Field(
         None, description="its possible values: a list, or label: value"
     )
 
@@ -793,14 +839,14 @@ class Scenario(Model):
     actions: ListOf[Primitive] = Field(
         PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
     )
-    params: dict[Word, int | bool | float | str | Parameter] = Field(
+    params: dict[Word, PlainValue | Parameter] = Field(
         default_factory=dict, description="name: default of parameters, used as $name, given as ?name=value"
     )
     grammar: Annotated[UtteranceGrammar, as_written(UtteranceGrammar | Word)] = Field(
         description="the agent's utterances: written out, or the name of a shared grammar"
     )
     room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
-    order: ListOf[Word] = Field((), description="placement order")
+    order: ListOf[Annotated[Word, Holds("name", "objects")]] = Field((), description="placement order")
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
         description="name: an object in the room",

@@ -15,13 +15,13 @@ from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.schema.annotations import (
     CALLED,
     annotation_at,
-    branches,
     expectation,
     home_of,
     keys_of,
     literals,
     model_at,
 )
+from socialai_dsl.schema.holds import branches
 from socialai_dsl.schema.scenario import (
     LANGUAGE_TAG,
     NOT_BLANK,

@@ -6,10 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
+from socialai_dsl.schema.holds import Holds
 from socialai_dsl.schema.scenario import WORD_SCHEMA, ListOf, Model, Prose, UtteranceGrammar, Word, as_written
 from socialai_dsl.vocabulary import Primitive
 
-MemberName = Annotated[str, Field(min_length=1, max_length=200)]
+MemberName = Annotated[str, Field(min_length=1, max_length=200), Holds("file")]
 """The path of a scenario, relative to the suite's file, with variants and parameters."""
 
 MemberNames = ListOf[MemberName]
@@ -22,16 +23,20 @@ def _form(value: Any) -> str:
 Label = Annotated[str, StringConstraints(pattern=r"^[^,=\[\]]+$", max_length=80)]
 """A value of a tree's parameter, as people call it."""
 
-Labels = ListOf[str | int | float | bool] | str | int | float | bool
+_Chosen = Annotated[str | int | float | bool, Holds("label", beside=(bool, int, float))]
+Labels = _Chosen | ListOf[_Chosen]
+
+Patch = Annotated[dict[str, JsonValue], Holds("patch")]
+"""Path in a scenario -> value."""
 
 
 class Changes(Model):
     """A suite's changes of a scenario, like a variant's, and the start of its episodes."""
 
-    set: dict[str, JsonValue] = Field(default_factory=dict, description="path: value, as in a variant")
-    remove: ListOf[str] = Field((), description="paths")
-    add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys")
-    layout: dict[str, JsonValue] | None = Field(
+    set: Patch = Field(default_factory=dict, description="path: value, as in a variant")
+    remove: ListOf[Annotated[str, Holds("spelt")]] = Field((), description="paths")
+    add: Patch = Field(default_factory=dict, description="path: items or keys")
+    layout: Annotated[dict[str, JsonValue], Holds("layout")] | None = Field(
         None, description="the start of every episode; the rest is drawn"
     )
 
@@ -40,7 +45,7 @@ class Entry(Changes):
     """A member that the suite changes."""
 
     scenario: MemberName = Field(description="the scenario, with variants and parameters")
-    name: Annotated[Word | None, as_written(Word | bool | None)] = Field(
+    name: Annotated[Word | None, as_written(Word | bool | None), Holds("label")] = Field(
         None, description="its name in the suite; default the scenario's name"
     )
 
@@ -56,7 +61,11 @@ class Value(Changes):
 
 
 Values = Annotated[
-    Annotated[ListOf[Label | int | float | bool], Field(min_length=1), Tag("list")]
+    Annotated[
+        ListOf[Annotated[Label | int | float | bool, Holds("label", beside=(bool, int, float))]],
+        Field(min_length=1),
+        Tag("list"),
+    ]
     | Annotated[dict[Label, Value], Field(min_length=1), Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
 ]
@@ -96,7 +105,7 @@ class Suite(Model):
     members: Annotated[ListOf[MemberName | Entry], Field(min_length=1, max_length=64)] | None = Field(
         None, description="scenarios"
     )
-    sweep: dict[MemberName, dict[str, ListOf[JsonValue]]] | None = Field(
+    sweep: dict[MemberName, Annotated[dict[str, ListOf[JsonValue]], Holds("patch")]] | None = Field(
         None, min_length=1, description="member: {path: values}; each combination is a member of its own"
     )
     tree: Value | None = Field(None, description="parameters with their values; an episode plays a leaf")

@@ -4,33 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
 
 from socialai_dsl.authoring.assist import complete
-from socialai_dsl.authoring.language_schema import FILES
 from socialai_dsl.checking import scenarios
 from socialai_dsl.frontend import check
-from socialai_dsl.library import GrammarLibrary, ObjectLibrary
-from socialai_dsl.loader.reader import value_at
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.schema import shape
-from socialai_dsl.schema.annotations import CALLED, holds_expressions, keys_of, literals, sections_of
+from socialai_dsl.schema.annotations import (
+    CALLED,
+    fields_of,
+    holds_expressions,
+    holds_of,
+    keys_of,
+    literals,
+    models,
+    sections_of,
+)
 from socialai_dsl.schema.experiment import Hyper
-from socialai_dsl.schema.files import VariantFile
+from socialai_dsl.schema.files import (
+    CurriculumFile,
+    ExperimentFile,
+    NpcFile,
+    ScenarioFile,
+    SuiteFile,
+    TestsFile,
+    VariantFile,
+)
+from socialai_dsl.schema.holds import TEXTS, branches
+from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import (
     CastGroup,
     CastMember,
-    Prose,
     Scenario,
-    StateName,
-    TextLine,
-    Texts,
     WrittenCast,
 )
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.words import VALUES
+from socialai_dsl.source import DataPath, Source
 
 WRITTEN_OTHERWISE = {CastGroup, WrittenCast, VariantFile, GrammarLibrary, ObjectLibrary, Hyper}
 """Models of what the loader takes apart, of libraries, and of options of the trainer, which have their own pages."""
@@ -44,21 +58,9 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from models_in(part)
 
 
-def reached() -> set[type[BaseModel]]:
-    """Every model of a file or of a part of one."""
-    found: set[type[BaseModel]] = set()
-    waiting = [model for models in FILES.values() for model in models]
-    while waiting:
-        model = waiting.pop()
-        if model not in found:
-            found.add(model)
-            waiting += [one for field in model.model_fields.values() for one in models_in(field.annotation)]
-    return found
-
-
 def test_every_model_has_a_name_in_messages_and_its_keys_in_the_reference() -> None:
     """A file that may build on another has the keys of what it is, and one more."""
-    own = {model.__base__ if "extends" in model.model_fields else model for model in reached()}
+    own = {model.__base__ if "extends" in model.model_fields else model for model in models()}
     of_libraries = set(models_in(ObjectLibrary.model_fields["types"].annotation))
     assert own - CALLED.keys() - WRITTEN_OTHERWISE - of_libraries == set()
     reference = (Path(__file__).parents[3] / "docs" / "reference.md").read_text(encoding="utf-8")
@@ -96,28 +98,87 @@ def test_every_section_is_a_mapping_or_a_list_of_the_model() -> None:
     assert {"splits", "sweep", "members"} <= {*sections_of(Suite)[0], *sections_of(Suite)[1]}
 
 
-def fields_of(*annotations: Any) -> Iterator[str]:
-    """The keys of fields that hold one of these, alone, optional, or in a list."""
-    wanted = {str(annotation) for annotation in annotations}
-    for model in CALLED:
-        for name, field in model.model_fields.items():
-            made = str(field.annotation)
-            if any(one in made for one in wanted):
-                yield field.alias or name
+def test_every_key_of_every_model_says_what_it_holds() -> None:
+    """By a word on its type where that leaves open what a text is."""
+    silent = [
+        (model.__name__, key)
+        for model in models()
+        for key, annotation in fields_of(model).items()
+        if holds_of(annotation) is None
+    ]
+    assert silent == []
 
 
-def test_a_text_is_a_text_whatever_yaml_takes_it_for() -> None:
-    """`say: No` says "No"."""
-    texts = {"ask", *fields_of(TextLine, Prose, StateName, Texts)} - {"nouns", "slots", "templates"}
-    assert {"say", "hears", "goto", "about", "ask"} <= texts
-    places = {
-        "start": ("frames", "f", "start"),
-        "ask": ("probes", "p", "ask"),
-        "answers": ("probes", "p", "answers", 0),
-        "do": ("tests", "t", "play", 0, "do"),
-    }
-    for key in texts:
-        assert value_at(places.get(key, ("x", key)), "No") == "No", key
+def places(model: type[BaseModel]) -> Iterator[tuple[DataPath, Any]]:
+    """A place in a file for each key of each model, with a word of the author wherever one can stand."""
+    waiting: list[tuple[Any, DataPath]] = [(model, ())]
+    known = set[object]()
+    while waiting:
+        annotation, path = waiting.pop(0)
+        yield path, annotation
+        for part in branches(annotation):
+            origin, arguments = get_origin(part), get_args(part)
+            if isinstance(part, type) and issubclass(part, BaseModel) and part not in known:
+                known.add(part)
+                waiting += [(held, (*path, key)) for key, held in fields_of(part).items()]
+            elif origin is dict:  # the author's words may be keys of the language, too
+                waiting += [(arguments[1], (*path, word)) for word in ("name", "state", "say", "mine")]
+            elif origin in (tuple, list):
+                waiting.append((arguments[0], (*path, 0)))
+
+
+def read_at(root: str, path: DataPath, word: str) -> object:
+    """What a plain word at a path of a document is read as, whose first key is `root`."""
+    written = f"{word}"
+    for step in reversed(path):
+        written = f"[{written}]" if isinstance(step, int) else f"{{{step}: {written}}}"
+    text = f"{{{root}, {written[1:]}"
+    return read_document(Source("x.yaml", text)).at(path).value
+
+
+@pytest.mark.parametrize(
+    ("root", "model"),
+    [
+        ("scenario: a", ScenarioFile),
+        ("suite: a", SuiteFile),
+        ("experiment: a", ExperimentFile),
+        ("npc: a", NpcFile),
+        ("tests_of: a", TestsFile),
+        ("library: grammars", GrammarLibrary),
+        ("variant: a", VariantFile),
+        ("curriculum: a", CurriculumFile),
+    ],
+)
+def test_a_text_is_a_text_whatever_yaml_takes_it_for(root: str, model: type[BaseModel]) -> None:
+    """`say: 5` says "5", wherever `say` is a key of the language, and `let: {say: 5}` is a number."""
+    seen = set[object]()
+    for path, annotation in places(model):
+        if path[:1] in ((), (root.partition(":")[0],)) or (held := holds_of(annotation)) is None:
+            continue
+        if held.kind in TEXTS:
+            assert read_at(root, path, "5") == (5 if int in held.beside else "5"), path
+            assert read_at(root, path, "No") == "No", path
+        elif held.kind in ("expression", "value", "number", "section"):
+            assert read_at(root, path, "5") == 5, path
+        seen.add(held.kind)
+    assert seen & TEXTS
+
+
+@pytest.mark.parametrize("verb", ["set", "add"])
+def test_a_patch_reads_a_value_as_the_place_that_it_changes(verb: str) -> None:
+    for path, read in {
+        "about": "5",
+        "horizon": 5,
+        "cast.ann.name": "5",
+        "cast.ann.with.name": 5,
+        "outcome[0].reward": 5,
+        "frames.f.states.one.then[greeting].say": "5",
+        "instructions": "5",
+    }.items():
+        document = read_document(Source("x.yaml", f"variant: v\n{verb}:\n  {path}: 5\n"))
+        assert document.at((verb, path)).value == read, path
+    tests = "variant: v\nof: any\nadd: {tests: {t: {play: [{do: 5}]}}}\n"
+    assert read_document(Source("x.yaml", tests)).at(("add", "tests", "t", "play", 0, "do")).value == "5"
 
 
 @pytest.mark.parametrize(
