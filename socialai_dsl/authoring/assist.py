@@ -10,11 +10,12 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 
 from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
-from socialai_dsl.authoring.names import Name, declared, frame_of, last_key, meant, part_at, visible
+from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
 from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
-from socialai_dsl.schema.annotations import annotation_at, holds_expressions, literals, model_at
+from socialai_dsl.schema.annotations import annotation_at, held_at, literals, model_at, named_by_keys
 from socialai_dsl.schema.files import ScenarioFile, model_of_file
+from socialai_dsl.schema.holds import TEXTS, Holds
 from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.dialogues import ENDS
 from socialai_dsl.semantics.signatures import Signature
@@ -23,13 +24,6 @@ from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, QUANTIFIER
 from socialai_dsl.source import Data, DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES
 
-_TEXTS: Final = ("say", "ask", "answers")
-"""Keys whose values are texts with values in them."""
-_PROSE: Final = ("about", "notes", "skills")
-"""Keys whose values are texts for people."""
-
-_NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario", "tests_of")
-_TEXTS_OF_TESTS: Final = ("do", "hears", "of", "ends")
 _WORDS: Final = {
     "agent": "the agent, whom a policy plays",
     "self": "the NPC that follows the frame",
@@ -90,7 +84,7 @@ def _about_key(cursor: Cursor, data: Data) -> str | None:
 def _about_word(cursor: Cursor, data: Data) -> str | None:
     word = cursor.word.removeprefix("$")
     before = cursor.before + ("$" if cursor.word.startswith("$") else "")
-    for name in [*meant(data, cursor.path, cursor.is_key, before), *_declares(cursor)]:
+    for name in [*meant(data, cursor.path, _held(cursor), before), *_declares(cursor)]:
         if name.word == word:
             return f"**{word}**: {name.kind}"
     for signature in _signatures(cursor):
@@ -105,34 +99,40 @@ def _declares(cursor: Cursor) -> Iterator[Name]:
         yield from (name for name in visible(cursor.data, cursor.path) if name.path == cursor.path)
 
 
+_TABLES: Final[dict[str, Mapping[str, Signature]]] = {
+    "activity": ACTIVITIES, "effect": EFFECTS, "place": PLACES, "expression": VALUES, "interval": VALUES,
+}  # fmt: skip
+"""What a key holds -> the words of the language that stand there."""
+
+
+def _held(cursor: Cursor) -> Holds | None:
+    """What the place of a cursor holds; of a key, what it names."""
+    root = _root(cursor.data) or ScenarioFile
+    return named_by_keys(root, cursor.path[:-1]) if cursor.is_key else held_at(root, cursor.path)
+
+
 def _signatures(cursor: Cursor) -> Iterable[Signature]:
     """The instructions that a word may be, those that fit its place first."""
-    key = last_key(cursor.path)
-    tables: Mapping[object, Mapping[str, Signature]] = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}
-    table = tables.get(key, VALUES)
-    return (
-        ()
-        if cursor.is_key or _is_prose(cursor.path) or (_is_text(cursor.path) and "<" not in cursor.before)
-        else (
-            *table.values(),
-            *(s for s in SIGNATURES if s.name not in table),
-        )
-    )
+    held = _held(cursor)
+    if cursor.is_key or _is_prose(held) or (_is_text(held) and not _is_in_value(cursor)):
+        return ()
+    table = _TABLES.get(held.kind if held is not None else "", VALUES)
+    return (*table.values(), *(s for s in SIGNATURES if s.name not in table))
 
 
-def _is_in_test(path: DataPath) -> bool:
-    return path[:1] == ("tests",)
-
-
-def _is_text(path: DataPath) -> bool:
+def _is_text(held: Holds | None) -> bool:
     """Whether a text stands there, in which only values are expressions."""
-    key = last_key(path)
-    return key in _TEXTS or (_is_in_test(path) and key in _TEXTS_OF_TESTS)
+    return held is not None and held.kind in TEXTS - {"state"}
 
 
-def _is_prose(path: DataPath) -> bool:
+def _is_in_value(cursor: Cursor) -> bool:
+    """Whether a word of a text is part of a value in < >."""
+    return cursor.before.rfind("<") > cursor.before.rfind(">")
+
+
+def _is_prose(held: Holds | None) -> bool:
     """Whether a text for people stands there, in which words of the language mean nothing."""
-    return last_key(path) in _PROSE or path[:1] == ("instructions",)
+    return held is not None and held.kind in ("prose", "told", "label")
 
 
 def usage(signature: Signature) -> str:
@@ -159,19 +159,18 @@ def declaration(document: Node, data: Data, line: int, column: int) -> DataPath 
         return file
     word = cursor.word.removeprefix("$")
     before = cursor.before + ("$" if cursor.word.startswith("$") else "")
-    names = meant(data, cursor.path, cursor.is_key, before)
+    names = meant(data, cursor.path, _held(cursor), before)
     return next((name.path for name in names if name.word == word), None)
 
 
 def _named_file(document: Node, cursor: Cursor) -> Path | None:
-    key = last_key(cursor.path)
-    value = part_at(document.data, cursor.path)
-    folder = document.source.path.parent if document.source.path is not None else None
-    if folder is None or cursor.is_key or key not in _NAMING_FILES or not isinstance(value, str):
+    held, folder = _held(cursor), document.source.path.parent if document.source.path is not None else None
+    value = cursor.path[-1] if cursor.is_key else part_at(document.data, cursor.path)
+    if folder is None or held is None or held.kind != "file" or not isinstance(value, str):
         return None
     name = value.partition("+")[0].partition("?")[0]
     for candidate in (folder / name, folder / f"{name}.yaml"):
-        if candidate.is_file() and len(cursor.path) <= 4:
+        if candidate.is_file():
             return candidate
     return None
 
@@ -201,45 +200,39 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
     if cursor.is_key:
         yield from _keys(cursor, cursor.path[:-1], data)
         return
-    key = last_key(cursor.path)
-    root = _root(cursor.data)
+    root, held = _root(cursor.data), _held(cursor)
+    kind = held.kind if held is not None else ""
     if not cursor.before.strip():
         yield from _keys(cursor, cursor.path, data)
         words = literals(annotation_at(root, cursor.path)) if root is not None else []
         yield from (Offer(str(word), "word", "") for word in words)
-    if key in _NAMING_FILES and folder is not None and len(cursor.path) <= 4 and not _is_in_test(cursor.path):
+    if cursor.word.startswith("$"):
+        yield from _names(meant(data, cursor.path, held, "$"))
+    elif kind == "file" and folder is not None:
         yield from (Offer(name, "file", "a file beside this one") for name in yaml_files(folder))
-    elif cursor.word.startswith("$"):
-        names = meant(data, cursor.path, False, "$")
-        yield from (Offer(name.word, "name", name.kind) for name in names)
-    elif key == "type":
-        yield from (Offer(name, "word", "an object type") for name in prelude().types)
-    elif key == "grammar":
-        yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
-    elif _is_in_test(cursor.path) and key == "do":
-        yield from (Offer(word, "word", "a movement") for word in (*PRIMITIVES, *STANDING[1:]))
+    elif kind in ("act", "utterance"):
+        acts = (*PRIMITIVES, *STANDING[1:]) if kind == "act" else ()
+        yield from (Offer(word, "word", "a movement") for word in acts)
         yield from _utterances(data)
-    elif _is_in_test(cursor.path) and key == "ends":
+    elif kind == "ending":
         yield from (Offer(word, "word", "how an episode ends") for word in (*ENDS, *_ids(data)))
-    elif key == "hears" and not _is_in_test(cursor.path):
-        yield from _utterances(data)
-    elif _is_prose(cursor.path) or (
-        _is_text(cursor.path) and cursor.before.rpartition("<")[2].count(">") != 0
-    ):
-        return
-    elif not _is_text(cursor.path) or "<" in cursor.before:
-        yield from _in_expression(cursor, data, key, root)
+    elif held == Holds("name", ("types",)):
+        yield from (Offer(name, "word", "an object type") for name in prelude().types)
+    elif held == Holds("name", ("grammars",)):
+        yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
+    elif not _is_prose(held) and (not _is_text(held) or _is_in_value(cursor)):
+        yield from _in_expression(cursor, data, held)
+
+
+def _names(names: Iterable[Name]) -> Iterator[Offer]:
+    return (Offer(name.word, "name", name.kind) for name in names)
 
 
 def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
     """The keys that the mapping at a path does not have yet."""
-    if cursor.is_key and path[:1] == ("cast",) and path[2:] == ("with",):
-        names = meant(data, (*path, ""), True, "")
-        yield from (Offer(name.word, "key", name.kind) for name in names)
-        return
-    if cursor.is_key and _is_in_test(path) and path[-1:] == ("state",):
-        members = declared(data, ("cast",), "a member of the cast")
-        yield from (Offer(name.word, "key", name.kind) for name in members)
+    held = _held(cursor)
+    if cursor.is_key and held is not None and held.kind == "name":
+        yield from (Offer(name.word, "key", name.kind) for name in meant(data, cursor.path, held, ""))
         return
     given = part_at(cursor.data, path)
     model = _model_of(cursor.data, path)
@@ -249,28 +242,23 @@ def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
             yield Offer(key, "key", field.description or "")
 
 
-def _in_expression(cursor: Cursor, data: Data, key: str, root: type[BaseModel] | None) -> Iterator[Offer]:
+def _in_expression(cursor: Cursor, data: Data, held: Holds | None) -> Iterator[Offer]:
+    kind = held.kind if held is not None else ""
     if cursor.before.endswith("."):
-        table: Mapping[str, Signature] = EFFECTS if key == "cause" else VALUES
+        table = _TABLES["effect" if kind == "effect" else "expression"]
         subject = cursor.before.removesuffix(".").split(" ")[-1].lstrip("(!<")
         yield from _verbs(table.values(), _kinds_of(subject, data))
         return
-    annotation = annotation_at(root, cursor.path) if root is not None else None
-    if holds_expressions(annotation) and literals(annotation):
-        return  # its own words, and numbers
-    yield from (Offer(n.word, "name", n.kind) for n in meant(data, cursor.path, False, cursor.before))
-    takes_values = holds_expressions(annotation) and key not in ("cause", "place")
-    if not takes_values and key in ("goto", "goto_now", "start", "frame", "role", "order", "id"):
+    yield from _names(meant(data, cursor.path, held, cursor.before))
+    if cursor.before.endswith("is(") or kind in ("state", "name", "new name"):
         return
-    if cursor.before.endswith("is("):
-        return
-    tables: list[Mapping[str, Signature]] = []
-    tables += [ACTIVITIES] if key == "do" and "(" not in cursor.before else []
-    tables += [PLACES] if key in ("place", "build") else []
-    tables += [VALUES] if takes_values or "(" in cursor.before or "<" in cursor.before else []
+    inner = "(" in cursor.before or "<" in cursor.before
+    tables = [_TABLES[kind]] if kind in ("place", "expression", "interval") else []
+    tables += [ACTIVITIES] if kind == "activity" and "(" not in cursor.before else []
+    tables += [VALUES] if inner and VALUES not in tables else []
     for table in tables:
         yield from _verbs(table.values(), {"none"} if table is not VALUES else {"none", "own"})
-    if VALUES in tables or key in ("cause", "place"):
+    if VALUES in tables or kind in ("effect", "place"):
         yield from (Offer(word, "word", about) for word, about in _WORDS.items())
 
 

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from socialai_dsl.schema.holds import Holds
 from socialai_dsl.source import Data, DataPath
 
-KINDS: Final = {
+_SECTIONS: Final = {
     "cast": "a member of the cast",
     "objects": "an object",
     "let": "drawn or computed once per episode",
@@ -19,6 +20,17 @@ KINDS: Final = {
     "memory": "a memory",
 }
 """Section -> what its names are, for those that any expression may use."""
+
+_OTHERS: Final = {
+    "frames": "a frame",
+    "roles": "a role",
+    "rivals": "a strategy without the skill",
+    "profiles": "a size of the experiment",
+    "params": "a parameter",
+    "types": "an object type",
+    "grammars": "a grammar",
+}
+"""The same for those that only some keys may name."""
 
 _OF_FRAMES: Final = {
     "let": "a register of this frame",
@@ -47,11 +59,6 @@ def part_at(data: Data, path: DataPath) -> Any:
     return part
 
 
-def last_key(path: DataPath) -> str:
-    """The key that a path ends in, or in whose list; empty for a path without one."""
-    return next((step for step in reversed(path) if isinstance(step, str)), "")
-
-
 def visible(data: Data, path: DataPath) -> list[Name]:
     """The names that an expression at a path may use: those of its frame, then those of the scenario."""
     frame = path[:2] if _in_a_frame(path) else ()
@@ -61,7 +68,7 @@ def visible(data: Data, path: DataPath) -> list[Name]:
         if frame
         for name in declared(data, (*frame, section), kind)
     ]
-    return found + [name for section, kind in KINDS.items() for name in declared(data, (section,), kind)]
+    return found + [name for section, kind in _SECTIONS.items() for name in declared(data, (section,), kind)]
 
 
 def declared(data: Data, path: DataPath, kind: str) -> list[Name]:
@@ -105,31 +112,44 @@ def frame_of(data: Data, member: str) -> str | None:
     return None
 
 
-def meant(data: Data, path: DataPath, is_key: bool, before: str) -> list[Name]:
-    """The names among which a word at a place is, with what stands before it in its text."""
-    key = last_key(path)
+def meant(data: Data, path: DataPath, held: Holds | None, before: str) -> list[Name]:
+    """The names among which a word at a place is, which holds something, with what stands before it in its text."""
     if before.endswith("$"):
-        return declared(data, ("params",), "a parameter")
-    if is_key:
-        if path[:1] == ("cast",) and path[2:3] == ("with",):
-            frame = frame_of(data, str(path[1]))
-            return declared(data, ("frames", frame, "slots"), f"a slot of `{frame}`") if frame else []
-        return []
-    if path[:1] == ("tests",) and path[-2:-1] == ("state",):
-        frame = frame_of(data, str(path[-1]).partition("[")[0])
-        return states(data, ("frames", frame)) if frame else []
-    if _in_a_frame(path) and (key in ("goto", "goto_now") or path[2:] == ("start",)):
-        return states(data, path[:2])
-    if key == "frame":
-        return declared(data, ("frames",), "a frame")
-    if key == "role":
-        return declared(data, ("roles",), "a role")
-    if key == "order":
-        return visible(data, ())
+        return _named(data, path, "params")
+    match held:
+        case Holds("state"):
+            return _states(data, path)
+        case Holds("name", of):
+            return [name for section in of for name in _named(data, path, section)]
+        case Holds("new name" | "file" | "number" | "truth" | "word"):
+            return []
     if before.endswith("is("):
         subject = before.removesuffix(".is(").split()[-1] if before.strip() else ""
         followed = frame_of(data, subject.strip("("))
-        if followed is not None:
-            return states(data, ("frames", followed))
-        return states(data, path[:2]) if _in_a_frame(path) else []
+        return states(data, ("frames", followed)) if followed is not None else _states(data, path)
     return visible(data, path)
+
+
+def _states(data: Data, path: DataPath) -> list[Name]:
+    """The states of the frame that a path leads into, or that a test asks of a member of the cast."""
+    if path[:1] == ("tests",):
+        frame = frame_of(data, str(path[-1]).partition("[")[0])
+        return states(data, ("frames", frame)) if frame else []
+    return states(data, path[:2]) if _in_a_frame(path) else []
+
+
+def _named(data: Data, path: DataPath, section: str) -> list[Name]:
+    """The names that a section declares: that of the frame that the path leads into first, then that of the file."""
+    if section == "slots":
+        frame = _frame_with_slots(data, path)
+        return declared(data, ("frames", frame, "slots"), f"a slot of `{frame}`") if frame else []
+    own = declared(data, (*path[:2], section), _OF_FRAMES.get(section, "")) if _in_a_frame(path) else []
+    return own + declared(data, (section,), {**_SECTIONS, **_OTHERS}[section])
+
+
+def _frame_with_slots(data: Data, path: DataPath) -> str | None:
+    """The frame whose slots are filled at a path: of a member of the cast, or of a whole file of one."""
+    if path[:1] == ("cast",):
+        return frame_of(data, str(path[1]))
+    frame = part_at(data, (*path[: path.index("with")], "frame"))
+    return frame if isinstance(frame, str) else None

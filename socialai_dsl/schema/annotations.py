@@ -216,8 +216,9 @@ def held_at(model: type[BaseModel], path: DataPath) -> Holds | None:
     held: Holds | None = Holds("section")
     for step in path:
         below = _step(annotation, step)
-        if isinstance(step, int):  # where each of a group has its own, the model has that of one
-            held = holds_of(below) or held
+        if isinstance(
+            step, int
+        ):  # a list holds what its items do; where each of a group has one, the model has one
             annotation = annotation if below is Any else below
         elif held is not None and held.kind == "patch":
             annotation = _patched(step)
@@ -225,6 +226,14 @@ def held_at(model: type[BaseModel], path: DataPath) -> Holds | None:
         else:
             annotation, held = below, holds_of(below)
     return held
+
+
+def named_by_keys(model: type[BaseModel], path: DataPath) -> Holds | None:
+    """What the keys of the mapping at a path are, if it is one of names."""
+    for part in branches(annotation_at(model, path)):
+        if get_origin(part) is dict:
+            return holds_of(get_args(part)[0])
+    return None
 
 
 _STEP: Final = re.compile(r"\[[^\[\]]*\]|[^.\[\]]+")
@@ -276,13 +285,6 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)
-
-
-def holds_expressions(annotation: Any) -> bool:
-    """Whether a place takes an expression, or several."""
-    parts = [part for part in branches(annotation) if part is not type(None)]
-    several = [get_args(part)[0] for part in parts if get_origin(part) is tuple]
-    return all(kind in parts for kind in (int, bool, str)) or any(map(holds_expressions, several))
 
 
 def sections_of(model: type[BaseModel]) -> tuple[list[str], list[str]]:

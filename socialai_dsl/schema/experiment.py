@@ -233,7 +233,7 @@ class Experiment(Model):
     overrides: OverrideList = Field(
         (), description="other settings for some of the conditions; later ones win"
     )
-    profile: Annotated[Word, Holds("name", "profiles")] | None = Field(
+    profile: Annotated[Word, Holds("name", ("profiles",))] | None = Field(
         None, description="the profile that is used where none is named"
     )
     profiles: dict[Word, Profile] = Field(default_factory=dict, description="sizes in which it can be run")

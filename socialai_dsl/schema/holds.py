@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 Kind = Literal[
     # texts
-    "text", "told", "prose", "state", "label",
+    "text", "told", "prose", "state", "label", "utterance",
     # the language
     "expression", "interval", "activity", "effect", "place", "value",
     # names
@@ -25,12 +25,12 @@ Kind = Literal[
 
 Texts: `text` is said, heard or read, with values in < >; `told` is read by players as it stands; `prose` is for people,
 and `null` is none; `state` names a state of a frame or the status of an object; `label` is what people call a condition
-or a parameter's value.
+or a parameter's value; an `utterance` is waited for.
 
 The language: `expression`, of which an `interval` is one of the form a..b; an `activity`, `effect` or `place` is an
 expression in words of its own; `value` is a plain value.
 
-Names: a `new name` is declared there; `name` is one of the section in `of`; `file` names a file.
+Names: a `new name` is declared there; `name` is one of the sections in `of`; `file` names a file.
 
 Tests: an `act` is what is typed, `heard` what is heard, `ending` how the episode ends.
 
@@ -39,7 +39,7 @@ Mappings: `patch` goes from paths in a scenario to values, `layout` is in the wo
 What the annotation says: `word` is one of a few, `section` a mapping, `spelt` a text of a form of its own.
 """
 
-TEXTS: frozenset[Kind] = frozenset({"text", "told", "prose", "state", "label", "act", "heard"})
+TEXTS: frozenset[Kind] = frozenset({"text", "told", "prose", "state", "label", "utterance", "act", "heard"})
 """Kinds of which nothing but a text can stand there, whatever YAML takes a plain word for."""
 
 
@@ -49,12 +49,13 @@ class Holds:
 
     Attributes:
         kind: what it is.
-        of: of a name, the section that declares it, `types` of the object types or `outcome` of the outcomes' ids.
+        of: of a name, the sections that declare it; of `types` the library of object types, of `grammars` that of
+            grammars does.
         beside: of a text, kinds of plain values that stay what they are beside texts.
     """
 
     kind: Kind
-    of: str = ""
+    of: tuple[str, ...] = ()
     beside: tuple[type, ...] = ()
 
 

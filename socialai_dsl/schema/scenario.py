@@ -37,12 +37,12 @@ Word = Annotated[
 ]
 """A name that an author declares: letters, digits and underscores, not starting with a digit."""
 
-FrameName = Annotated[Word, Holds("name", "frames")]
-RoleName = Annotated[Word, Holds("name", "roles")]
-LetName = Annotated[Word, Holds("name", "let")]
-LookName = Annotated[Word, Holds("name", "looks")]
-TypeName = Annotated[Word, Holds("name", "types")]
-ObjectName = Annotated[str, Holds("name", "objects")]
+FrameName = Annotated[Word, Holds("name", ("frames",))]
+RoleName = Annotated[Word, Holds("name", ("roles",))]
+LetName = Annotated[Word, Holds("name", ("let",))]
+LookName = Annotated[Word, Holds("name", ("looks",))]
+TypeName = Annotated[Word, Holds("name", ("types",))]
+ObjectName = Annotated[str, Holds("name", ("objects",))]
 """Names that are declared elsewhere; that of an object may have a number, `boxes[1]`."""
 
 LANGUAGE_TAG: Final = r"^[a-z]{2,3}(-[A-Z][a-z]{3})?(-([A-Z]{2}|[0-9]{3}))?$"
@@ -56,6 +56,7 @@ Target = Annotated[
     StringConstraints(
         pattern=r"^\s*[A-Za-z_][A-Za-z0-9_]*\s*(\(.+\)\s*)?(\.\s*[A-Za-z_][A-Za-z0-9_]*\s*)?$", max_length=200
     ),
+    Holds("name", ("let", "state", "looks")),
 ]
 """What `set` changes: a register, one of those for each of a group, `trust(speaker)`, or a look, `ann.mood`."""
 
@@ -159,7 +160,7 @@ class Model(BaseModel):
     )
 
 
-Earshot = Literal["next_to", "room"] | Expression
+Earshot = Annotated[Expression | Literal["next_to", "room"], Holds("word")]
 """The reach of a voice: a word, or a number of cells."""
 
 
@@ -192,7 +193,9 @@ class Rule(Effects):
     """Conditions, all of which must hold, and effects."""
 
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
-    hears: Texts = Field((), description="an utterance, or a list of alternatives")
+    hears: Annotated[Texts, Holds("utterance")] = Field(
+        (), description="an utterance, or a list of alternatives"
+    )
     addressed: bool | None = Field(None, description="of `hears`: only what is said to it, or only the rest")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
     after: Expression | None = Field(None, description="holds from this turn in the state on")
@@ -352,7 +355,9 @@ class Source(Model):
 
     of: Expression = Field(description="what is believed then")
     when: Expression | None = Field(None, description="a condition", examples=["sees(toy)"])
-    hears: Texts = Field((), description="an utterance, or a list of alternatives")
+    hears: Annotated[Texts, Holds("utterance")] = Field(
+        (), description="an utterance, or a list of alternatives"
+    )
 
 
 class Belief(Model):
@@ -390,7 +395,7 @@ class Character(Model):
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
     earshot: Earshot | None = Field(None, description="the reach of its voice")
     frame: FrameName | None = Field(None, description="the frame it follows; default none: it stays")
-    with_: dict[Word, ExpressionOrText] = Field(
+    with_: dict[Annotated[Word, Holds("name", ("slots",))], ExpressionOrText] = Field(
         default_factory=dict, alias="with", description="fills the slots"
     )
     beliefs: dict[Word, Belief] = Field(default_factory=dict, description="name: a belief")
@@ -513,7 +518,7 @@ class ObjectGroup(Model):
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
     dark: bool = Field(False, description="the agent sees no difference between its statuses")
     carryable: bool = Field(False, description="it can be picked up, carried and given")
-    inside: ObjectName | None = Field(
+    inside: Annotated[str, Holds("name", ("objects", "cast"))] | None = Field(
         None, description="the object it lies in, unseen until that is opened, or who carries it at first"
     )
     exclusive: bool = Field(
@@ -608,7 +613,7 @@ class UtteranceGrammar(Model):
 MemberName = Annotated[
     str,
     StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40),
-    Holds("name", "cast"),
+    Holds("name", ("cast",)),
 ]
 """A member of the cast; those of a group are numbered from 0: `peers[0]`."""
 
@@ -642,7 +647,7 @@ class Property(Model):
     script: Literal["perceives"] | None = Field(
         None, description="the variant `oracle` acts on its perceptions alone"
     )
-    rival: Annotated[Word, Holds("name", "rivals")] | None = Field(
+    rival: Annotated[Word, Holds("name", ("rivals",))] | None = Field(
         None, description="a strategy of `rivals`, which must not succeed too often"
     )
     at_most: Probability | None = Field(
@@ -842,11 +847,13 @@ class Scenario(Model):
     params: dict[Word, PlainValue | Parameter] = Field(
         default_factory=dict, description="name: default of parameters, used as $name, given as ?name=value"
     )
-    grammar: Annotated[UtteranceGrammar, as_written(UtteranceGrammar | Word)] = Field(
-        description="the agent's utterances: written out, or the name of a shared grammar"
-    )
+    grammar: Annotated[
+        UtteranceGrammar, as_written(UtteranceGrammar | Word), Holds("name", ("grammars",))
+    ] = Field(description="the agent's utterances: written out, or the name of a shared grammar")
     room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
-    order: ListOf[Annotated[Word, Holds("name", "objects")]] = Field((), description="placement order")
+    order: ListOf[Annotated[Word, Holds("name", ("objects", "cast"))]] = Field(
+        (), description="placement order"
+    )
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
         description="name: an object in the room",

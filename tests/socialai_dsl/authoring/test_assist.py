@@ -1,10 +1,11 @@
 """What can be written at a place, also while the file is no YAML; what a word means."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from socialai_dsl.authoring.assist import complete, explain, usage
+from socialai_dsl.authoring.assist import complete, declaration, explain, usage
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.semantics.words import SIGNATURES
 from socialai_dsl.source import Source
@@ -95,6 +96,77 @@ def test_completion_in_a_reference_of_an_experiment(typed: str, expected: str) -
     whole = read_document(Source("", text + "}}\n")).data
     plain, line, column = marked(f"{text}, {typed}^}}}}\n")
     assert expected in [offer.text for offer in complete(plain, whole, None, line, column)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "offered_there", "others"),
+    [
+        (
+            "outcome:",
+            "check: [{rival: ^}]\nrivals: {guess: {steps: []}}\noutcome:",
+            {"guess"},
+            {"agent", "t"},
+        ),
+        ("outcome:", "check: [{needs: ^}]\noutcome:", {"ann", "agent"}, {"exit", "t"}),
+        ("outcome:", "check: [{needs: ann, draw: ^}]\noutcome:", {"shade"}, {"ann"}),
+        ("type: door", "type: door, opens: ^", {"exit"}, {"ann", "shade"}),
+        ("type: door", "type: door, inside: ^", {"exit", "ann"}, {"shade"}),
+        ("type: door", "type: door, pushed_by: ^", {"door", "ball"}, {"exit"}),
+        (
+            "outcome:",
+            "looks: {mood: {for: ann, words: [a, b]}}\nobserve: {tone: ^}\noutcome:",
+            {"mood"},
+            {"ann"},
+        ),
+        ("outcome:", "order: [^]\noutcome:", {"exit", "ann"}, {"shade", "t"}),
+        ("hears: Where is the exit, say: There.", "say: There., set: {^}", {"n"}, {"exit"}),
+        ("outcome:", "horizon: ^\noutcome:", set(), {"agent", "t", "sees"}),
+        ("outcome:", "params: {n: {default: ^}}\noutcome:", {"ann"}, {"sees"}),
+        ("outcome:", "published: [{who: chil^, did: x}]\noutcome:", set(), {"agent"}),
+        ("outcome:", "memory: {m: {of: ^}}\noutcome:", {"agent.acts"}, {"base.yaml"}),
+        ("scenario: a", "scenario: ^", set(), {"base.yaml"}),
+        ("templates: [Where", "templates: [Wh^", set(), {"agent"}),
+    ],
+)
+def test_what_is_offered_is_what_the_key_holds(
+    tmp_path: Path, old: str, new: str, offered_there: set[str], others: set[str]
+) -> None:
+    (tmp_path / "base.yaml").write_text("")
+    text = TEXT.replace("    states:", "    let: {n: 0}\n    states:", 1).replace(old, new, 1)
+    plain, line, column = marked(text)
+    found = {offer.text for offer in complete(plain, None, tmp_path, line, column)}
+    assert offered_there <= found
+    assert not others & found
+
+
+def test_files_are_offered_and_opened_wherever_a_key_names_one(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text("")
+    for text in (
+        "scenario: a\ncast: {ann: {one_of: [^]}}\n",
+        "suite: a\nsplits: {s: {replace: {x: ^}}}\n",
+        "suite: a\nsplits: {s: {members: [^]}}\n",
+        "experiment: e\nconditions: [{name: one, tests: [{scenario: ^}]}]\n",
+        "experiment: e\nconditions: [{name: one, tests: [^]}]\n",
+    ):
+        assert "base.yaml" in offered(text, tmp_path), text
+        plain, line, column = marked(text.replace("^", "ba^se"))
+        document = read_document(replace(Source("a.yaml", plain), path=tmp_path / "a.yaml"))
+        assert declaration(document, document.data, line, column) == tmp_path / "base.yaml", text
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("hears: Where is", "hears: Where i^s"),
+        ("templates: [Where is", "templates: [Where i^s"),
+        ("ann: {frame: duty}", "ann: {frame: duty, name: Ann i^s}"),
+        ("outcome:", "published: [{who: it i^s, did: x}]\noutcome:"),
+    ],
+)
+def test_words_of_a_text_are_no_words_of_the_language(old: str, new: str) -> None:
+    plain, line, column = marked(TEXT.replace(old, new, 1))
+    document = read_document(Source("a.yaml", plain))
+    assert explain(document, document.data, line, column) is None
 
 
 def test_no_prose_is_completed() -> None:

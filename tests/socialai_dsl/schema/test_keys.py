@@ -17,10 +17,8 @@ from socialai_dsl.schema import shape
 from socialai_dsl.schema.annotations import (
     CALLED,
     fields_of,
-    holds_expressions,
     holds_of,
     keys_of,
-    literals,
     models,
     sections_of,
 )
@@ -38,12 +36,10 @@ from socialai_dsl.schema.holds import TEXTS, branches
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import (
     CastGroup,
-    CastMember,
     Scenario,
     WrittenCast,
 )
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.words import VALUES
 from socialai_dsl.source import DataPath, Source
 
 WRITTEN_OTHERWISE = {CastGroup, WrittenCast, VariantFile, GrammarLibrary, ObjectLibrary, Hyper}
@@ -203,14 +199,6 @@ def test_values_are_offered_where_a_place_takes_an_expression(
     offered = {offer.text for offer in complete(text, None, None, 2, len(before) + 1)}
     assert some <= offered
     assert not others & offered
-
-
-def test_a_place_takes_an_expression_by_its_annotation() -> None:
-    member = CastMember.model_fields
-    assert holds_expressions(member["accepts"].annotation)
-    assert literals(member["earshot"].annotation) == ["next_to", "room"]
-    assert not holds_expressions(member["view"].annotation)
-    assert VALUES
 
 
 def test_keys_whose_loss_is_indifferent_are_keys() -> None:
