@@ -9,9 +9,10 @@ from functools import cached_property, partial
 from typing import Final
 
 from socialai_dsl.compiler.assembler import NOWHERE, Block, Label, Registers, Sites
-from socialai_dsl.compiler.folding import TRUE, Classes, Facts, Mobility, fold, mentions, substitute
+from socialai_dsl.compiler.folding import TRUE, Classes, Facts, fold, mentions, substitute
 from socialai_dsl.program import CELL, TEMPORARY, Counting, Field, Op, Register, constant
 from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.changes import Mobility
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.terms import (
     Const,

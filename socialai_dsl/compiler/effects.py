@@ -20,12 +20,13 @@ from socialai_dsl.compiler.assembler import (
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
-from socialai_dsl.compiler.folding import FALSE, Mobility, fold_whole
+from socialai_dsl.compiler.folding import FALSE, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, MemberSelection, sizes
 from socialai_dsl.program import CELL, Field, Op, Register, constant
 from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.changes import Mobility
 from socialai_dsl.semantics.plans import (
     Assignment,
     CheckedScenario,

@@ -13,12 +13,13 @@ from socialai_dsl.compiler.cells import (
 )
 from socialai_dsl.compiler.effects import Homes
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.folding import ChangeAnalysis, When, fold, mentions
+from socialai_dsl.compiler.folding import fold, mentions
 from socialai_dsl.compiler.hands import into_hands
 from socialai_dsl.compiler.step_order import first_entry
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import Counting, Field, Op, Register, Side, constant
 from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.facts import TermFacts, When
 from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (
     CheckedScenario,
@@ -413,9 +414,9 @@ class ComputedStatuses:
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
-        changes = ChangeAnalysis(checked)
-        whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
-        for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
+        facts = TermFacts(checked)
+        whens = [(item, facts.when(item.condition.term)) for item in checked.computed]
+        for_good = [when == When.NEVER and not facts.touched(item.entity) for item, when in whens]
         self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
         self.settled = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if not fixed)
         self.settle_always = any(when == When.ANY_TIME for _, when in whens)

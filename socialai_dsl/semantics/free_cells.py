@@ -16,6 +16,7 @@ from random import Random
 from typing import Final
 
 from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.facts import needs, relation
 from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Const, Term, compute, walk
@@ -137,9 +138,6 @@ class PartialEvaluation:
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
 _NAMED: Final = 5
 """How many of those are named that are in the way."""
-
-_TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
-"""How many cells at most `not here.TEST(x)` excludes for each x."""
 
 
 def check_placements(checked: CheckedScenario, findings: Findings) -> frozenset[int]:
@@ -421,23 +419,16 @@ def _place_of(placing: Placing) -> object:
 
 def _of_the_cell(term: Term) -> bool:
     """Whether a condition reads only the cell and the size of the room."""
-    known = (Const, terms.World, terms.Here, terms.Operation, terms.Compare, terms.Logic, terms.Not)
-    return all(
-        isinstance(part, known)
-        and not (isinstance(part, terms.World) and part.name not in ("width", "height"))
-        for part in walk(term)
-    )
+    return {need.what for need in needs(term)} <= {"candidate", "size"}
 
 
 def _taken_away(term: Term) -> int:
-    """How many cells a condition excludes at most."""
-    match term:
-        case terms.Not(arg=terms.Test(subject=None, name=name)) if name in _TAKES_AWAY:
-            return _TAKES_AWAY[name]
-        case terms.Not(
-            arg=terms.Quantification(op="any", items=items, condition=terms.Test(subject=None, name=name))
-        ) if name in _TAKES_AWAY:
-            return _TAKES_AWAY[name] * len(items)
+    """How many cells a condition excludes at most: `not here.at(x)`, `not any(x in group where here.at(x))`."""
+    times, asked = 1, term.arg if isinstance(term, terms.Not) else None
+    if isinstance(asked, terms.Quantification) and asked.op == "any":
+        times, asked = len(asked.items), asked.condition
+    if isinstance(asked, terms.Test) and asked.subject is None and (most := relation(asked).most) is not None:
+        return most * times
     raise UnknownError
 
 
@@ -528,11 +519,7 @@ def _sizes_of(checked: CheckedScenario) -> str:
 
 def asks_about_cells(placing: Placing) -> bool:
     """Whether a place may be empty without being meant to: a `where` that reads no cell decides who is there."""
-    return placing.where is None or any(_reads_cell(part) for part in walk(placing.where))
-
-
-def _reads_cell(part: Term) -> bool:
-    return isinstance(part, terms.Here) or (isinstance(part, terms.Test) and part.subject is None)
+    return placing.where is None or any(need.what == "candidate" for need in needs(placing.where))
 
 
 def _tried(checked: CheckedScenario) -> tuple[int, Counter[int], Counter[int]]:
@@ -651,8 +638,10 @@ class _DrawnRoom(PartialEvaluation):
                 return None if cell is None else cell["xy".index(name)]
             case terms.Measure(name="distance", args=(one, other)):
                 return self._distance(self._cell(one), self._cell(other))
-            case terms.Test(name=name, subject=subject, object=target):
-                return self._related(name, self.here if subject is None else self._cell(subject), target)
+            case terms.Test(subject=subject, object=target):
+                return self._related(
+                    term, self.here if subject is None else self._cell(subject), self._cell(target)
+                )
             case terms.Quantification(cells=False):
                 return self._quantified(term)
         return super().value(term)
@@ -667,18 +656,9 @@ class _DrawnRoom(PartialEvaluation):
     def _distance(one: Cell | None, other: Cell | None) -> int | None:
         return None if one is None or other is None else abs(one[0] - other[0]) + abs(one[1] - other[1])
 
-    def _related(self, name: str, cell: Cell | None, target: Term) -> int | None:
-        other = self._cell(target)
-        if cell is None or other is None:
-            return None
-        match name:
-            case "at":
-                return int(cell == other)
-            case "next_to":
-                return int(self._distance(cell, other) == 1)
-            case "in_line":
-                return None if cell[0] == other[0] or cell[1] == other[1] else 0
-        return None
+    @staticmethod
+    def _related(term: terms.Test, one: Cell | None, other: Cell | None) -> int | None:
+        return None if one is None or other is None else relation(term).known(one, other)
 
     def _quantified(self, term: terms.Quantification) -> int | None:
         truths = [(item.value, self._holds_for(term, item.value)) for item in term.items]

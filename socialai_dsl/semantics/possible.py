@@ -15,24 +15,21 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar.ast import Not, every, unparse
 from socialai_dsl.schema.scenario import Frame, Scenario, State, Step, UtteranceGrammar
 from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.facts import SaidLater, TermFacts
 from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of, surviving
 from socialai_dsl.semantics.terms import (
     Const,
     Logic,
-    ObjectType,
-    Select,
     SitedTerm,
     Term,
     changed,
     draws,
     is_looked_for,
     is_own_noun,
-    may_be_nothing,
     may_find_nothing,
     walk,
 )
-from socialai_dsl.semantics.words import EFFECTS
 from socialai_dsl.source import DataPath, Span, TextEdit
 from socialai_dsl.vocabulary import Sentences, first_alike, normal
 
@@ -497,18 +494,12 @@ def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
                 yield step.until.span, _in_turn(frame, step.until)
 
 
-class _SaidLater(terms.SaidBy):
-    """What a member says in this step that has its turn later, so that it is never said yet."""
-
-    __slots__ = ()
-
-
 def _in_turn(frame: FramePlan, condition: SitedTerm) -> SitedTerm:
     """A condition as it is asked in the turn of a member: those who come after it have said nothing in this step."""
 
     def later(term: Term) -> Term | None:
         if isinstance(term, terms.SaidBy) and term.entity > frame.entity:
-            return _SaidLater(term.entity, term.pattern)
+            return SaidLater(term.entity, term.pattern)
         return None
 
     return replace(condition, term=changed(condition.term, later))
@@ -524,11 +515,11 @@ def _those(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
 
 
 class Possible:
-    """The possible values of the parts of a scenario, each by itself."""
+    """Which conditions of a scenario can hold, each by itself, and why others cannot."""
 
     def __init__(self, checked: CheckedScenario) -> None:
         self._checked = checked
-        self._statuses = _Statuses(checked)
+        self._facts = TermFacts(checked)
 
     def never(self, conditions: Sequence[SitedTerm]) -> str | None:
         """Why none of these conditions can hold; None if one of them may.
@@ -537,7 +528,7 @@ class Possible:
         """
         why = None
         for condition in conditions:
-            if self._may(condition.term):
+            if self._facts.may_be(condition.term):
                 return None
             why = why or self._why(condition.term)
         return why
@@ -546,65 +537,8 @@ class Possible:
         """Whether none of these conditions can be false, and that not as they are written."""
         asked = [condition.term for condition in conditions]
         return not all(isinstance(term, Const) for term in asked) and not any(
-            self._may(term, wanted=False) or may_find_nothing(term) for term in asked
+            self._facts.may_be(term, wanted=False) or may_find_nothing(term) for term in asked
         )
-
-    def _may(self, term: Term, wanted: bool = True) -> bool:
-        """Whether a condition may be true, or false."""
-        match term:
-            case Const(value=value):
-                return bool(value) is wanted
-            case _SaidLater():
-                return not wanted
-            case terms.Not(arg=arg):
-                return self._may(arg, not wanted)
-            case terms.Logic(op=op, args=args):
-                every = (op == "and") is wanted
-                return (all if every else any)(self._may(arg, wanted) for arg in args)
-            case terms.Compare():
-                return self._may_compare(term, wanted)
-            case terms.Quantification(op="any" | "all" as op, items=items, condition=condition, cells=False):
-                if not items:
-                    return (op == "all") is wanted
-                if (op == "any") is wanted and condition is not None:
-                    return self._may(condition, wanted)
-        return True
-
-    def _may_compare(self, term: terms.Compare, wanted: bool) -> bool:
-        if any(is_own_noun(side) or may_be_nothing(side) for side in (term.left, term.right)):
-            return True  # a silent member names no noun, and a register may hold nothing
-        op, left, right = term.op, term.left, term.right
-        a, b = self._values(left), self._values(right)
-        if not a or not b:
-            return True
-        if op in ("==", "!="):
-            return _meet(a, b) if (op == "==") is wanted else not a[0] == a[-1] == b[0] == b[-1]
-        if not wanted:  # not a < b is b <= a
-            a, b, op = b, a, "<=" if op == "<" else "<"
-        return a[0] < b[-1] if op == "<" else a[0] <= b[-1]
-
-    def _values(self, term: Term) -> Sequence[int]:
-        """All that a term can be, at most, in ascending order; empty if that is not known.
-
-        A range may have more members than `len` can count.
-        """
-        match term:
-            case Const(value=value):
-                return (value,)
-            case terms.FieldOf(entity=entity, name="status"):
-                low, high = entity.type.low, entity.type.high
-                found = {
-                    s for number in range(low, high + 1) for s in self._statuses.of(number, term.type.size)
-                }
-                return sorted(found) or term.type.values
-            case Select(values=values, default=default):
-                parts = [self._values(part) for part in (*values, default)]
-                if not all(parts):
-                    return ()
-                if any(part[-1] - part[0] > 256 for part in parts):
-                    return range(min(part[0] for part in parts), max(part[-1] for part in parts) + 1)
-                return sorted({value for part in parts for value in part})
-        return term.type.values
 
     # -- words --
 
@@ -612,12 +546,14 @@ class Possible:
         """What of a condition is never so, as a hint; None where nothing in it depends on what happens."""
         match term:
             case terms.Logic(op="and", args=args):
-                return next((why for arg in args if not self._may(arg) and (why := self._why(arg))), None)
+                return next(
+                    (why for arg in args if not self._facts.may_be(arg) and (why := self._why(arg))), None
+                )
             case terms.Logic(args=args):
                 return next((why for arg in args if (why := self._why(arg))), None)
             case terms.Quantification(condition=condition, items=items) if condition is not None and items:
                 return self._why(condition)
-            case _SaidLater(entity=entity):
+            case SaidLater(entity=entity):
                 who = self._checked.entities[entity].key
                 return (
                     f"`{who}` has its turn later in the step: what it said is heard by `hears:`, `heard(any)`"
@@ -631,7 +567,7 @@ class Possible:
     def _why_not_equal(self, left: Term, right: Term) -> str:
         if isinstance(left, terms.FieldOf) and left.name == "status" and isinstance(right, Const):
             words = left.type.words
-            can = " or ".join(words[value - left.type.low] for value in self._values(left))
+            can = " or ".join(words[value - left.type.low] for value in self._facts.values(left))
             wanted = words[right.value - left.type.low]
             name = self._name(left.entity)
             return f"nothing makes {name} `{wanted}`: it is {can}"
@@ -641,14 +577,6 @@ class Possible:
         low, high = entity.type.low, entity.type.high
         keys = dict.fromkeys(self._checked.entities[number].key for number in range(low, high + 1))
         return " or ".join(f"`{key}`" for key in keys)
-
-
-def _meet(a: Sequence[int], b: Sequence[int]) -> bool:
-    """Whether two ascending sequences have a member in common."""
-    if isinstance(a, range) and isinstance(b, range):
-        return a[0] <= b[-1] and b[0] <= a[-1]
-    few, others = (b, a) if isinstance(a, range) else (a, b)
-    return any(value in others for value in few)
 
 
 def _bounds(left: Term, right: Term) -> str:
@@ -678,77 +606,3 @@ def _between(term: Term) -> str:
     if type_.kind == "entity":
         return "something else"
     return f"{type_.low}" if type_.size == 1 else f"from {type_.low} to {type_.high}"
-
-
-class _Statuses:
-    """The statuses that each object can ever have: at first, by being toggled or pushed, by links and effects."""
-
-    def __init__(self, checked: CheckedScenario) -> None:
-        self._checked = checked
-        self._opened = {number for entity in checked.entities for number in entity.opens}
-        self._unlocked = {number for entity in checked.entities for number in entity.unlocks}
-        self._computed: dict[int, set[int]] = {}
-        for one in checked.computed:
-            self._computed.setdefault(one.entity, set()).update((one.on, one.off))
-        self._effects: dict[int, list[Effect]] = {}
-        for effect in (effect for plan in checked.causing for effect in plan.causes):
-            for entity in effect.entities:
-                for number in entity.type.values:
-                    self._effects.setdefault(number, []).append(effect)
-        self._known: dict[int, frozenset[int]] = {}
-
-    def of(self, number: int, size: int) -> frozenset[int]:
-        """Statuses of an entity; all, as many as `size`, for what is no object."""
-        if number not in self._known:
-            type_ = self._checked.entities[number].type
-            self._known[number] = frozenset(range(size)) if type_ is None else self._reached(number, type_)
-        return self._known[number]
-
-    def _reached(self, number: int, type_: ObjectType) -> frozenset[int]:
-        every = frozenset(range(len(type_.states)))
-        if number in self._opened:
-            return every
-        found = {*self._initial(number, type_), *self._computed.get(number, ())}
-        if number in self._unlocked:
-            found.add(type_.unlocked)
-        for effect in self._effects.get(number, ()):
-            gives = self._given(effect, type_)
-            if gives is None:
-                return every
-            found |= gives
-        waiting = list(found)
-        while waiting:
-            status = waiting.pop()
-            for following in (type_.toggled, type_.pushed, type_.expired):
-                if status in following and following[status] not in found:
-                    found.add(following[status])
-                    waiting.append(following[status])
-            if status in type_.rolls and type_.initial not in found:
-                found.add(type_.initial)
-                waiting.append(type_.initial)
-        return frozenset(found)
-
-    def _initial(self, number: int, type_: ObjectType) -> Iterator[int]:
-        entity = self._checked.entities[number]
-        if entity.initial is None:
-            yield entity.status
-            return
-        path = entity.initial.path
-        drawn = (item for item in self._checked.setup if isinstance(item, plans.Drawn) and item.path == path)
-        for item in drawn:
-            yield from (part.value for part in walk(item.value.term) if isinstance(part, Const)
-                        and part.type.kind == "status")  # fmt: skip
-        yield type_.initial
-
-    def _given(self, effect: Effect, type_: ObjectType) -> set[int] | None:
-        """Statuses that an effect leads to; None for any."""
-        word = EFFECTS[effect.name]
-        if word.makes is not None:
-            return {type_.states.index(word.makes)}
-        if word.needs is not None:
-            return {type_.unlocked}
-        if not word.sets_status:
-            return set()
-        if isinstance(effect.value, Const):
-            return {effect.value.value}
-        return None

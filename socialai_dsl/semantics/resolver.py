@@ -53,6 +53,7 @@ from socialai_dsl.semantics.terms import (
     arithmetic,
     draws,
     integer,
+    may_find_nothing,
     nothing_of,
     number,
     walk,
@@ -272,7 +273,7 @@ class Registers:
             known = Drawn(f"{NOTED}{len(self.remembered)}", value.term.type, value)
             self.remembered.append(known)
             self.sources[known.path] = _registers_in(value.term)
-        return Read(known.type, known.path)
+        return Read(known.type, known.path, may_miss=may_find_nothing(value.term))
 
     @contextmanager
     def apart(self) -> Iterator[None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
+from typing import Final
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
@@ -12,6 +13,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
 from socialai_dsl.semantics import groups, hands, object_facts, tables
 from socialai_dsl.semantics.entities import AGENT
+from socialai_dsl.semantics.facts import What, entities_of, needs
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
@@ -31,23 +33,17 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     COLOR,
     DIRECTION,
-    CellBeside,
-    CellOf,
     Compare,
     Const,
     FieldOf,
     Here,
     Logic,
-    Measure,
     Not,
     ObjectType,
     Operation,
-    Read,
-    Sees,
     Select,
     SitedTerm,
     Term,
-    Test,
     World,
     chosen,
     walk,
@@ -257,12 +253,6 @@ def _follows_from_size(term: Term) -> bool:
     if isinstance(term, Here):
         return term.name != "cell"
     return isinstance(term, Const | World | Operation | Compare | Not | Logic | Select)
-
-
-# -- the order: what something needs comes before it ---------------------------------------------------------
-
-
-_FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact", "looks_at"})
 
 
 # -- placements --------------------------------------------------------------------------------------------------
@@ -582,7 +572,7 @@ class _Sorter:
         self._path.append(key)
         try:
             for item in self._items[key]:
-                for need in needs(item):
+                for need in _needs(item):
                     self._visit(need)
         finally:
             self._path.pop()
@@ -606,48 +596,28 @@ class _Sorter:
         return f"{what} of `{name}`"
 
 
-def needs(item: Setup) -> list[str]:
+_KEYS: Final[dict[What, str]] = {"cell": "cell", "container": "cell", "facing": "facing", "color": "color"}
+"""What a reset gives entities, by what may be needed of them."""
+
+
+def _needs(item: Setup) -> list[str]:
     """Keys of what has to be known before an item: registers, cells, colours, directions."""
     found: dict[str, None] = {}
     if isinstance(item, Coloring):
         found |= {f"color {n}": None for n in item.distinct_from}
     if isinstance(item, Facing) and item.toward is not None:
-        found |= {f"cell {n}": None for n in (item.entity, *_numbers(item.toward))}
+        found |= {f"cell {n}": None for n in (item.entity, *entities_of(item.toward))}
     if isinstance(item, Placing):
         for region in item.regions:
             for term in region.args if region.name in ("next_to", "in_front_of") else ():
-                found |= {f"cell {n}": None for n in _numbers(term)}
+                found |= {f"cell {n}": None for n in entities_of(term)}
                 if region.name == "in_front_of":
-                    found |= {f"facing {n}": None for n in _numbers(term)}
+                    found |= {f"facing {n}": None for n in entities_of(term)}
     if isinstance(item, Placing) and item.inside is not None and not item.in_hands:
-        found |= {f"cell {n}": None for n in _numbers(item.inside)}
-    for term in walk(item):
-        found |= dict.fromkeys(_needs(term))
+        found |= {f"cell {n}": None for n in entities_of(item.inside)}
+    for need in needs(item):
+        if need.what == "register":
+            found[need.path] = None
+        elif need.what in _KEYS:
+            found |= {f"{_KEYS[need.what]} {n}": None for n in need.entities}
     return list(found)
-
-
-def _needs(term: Term) -> Iterator[str]:
-    match term:
-        case Read(path=path):
-            yield path
-        case FieldOf(entity=entity, name=name):
-            kind = {"x": "cell", "y": "cell", "inside": "cell", "dir": "facing", "color": "color"}.get(name)
-            yield from (f"{kind} {n}" for n in _numbers(entity) if kind)
-        case Test(name=name, subject=subject, object=other):
-            entities = [*_numbers(other), *(_numbers(subject) if subject is not None else ())]
-            yield from (f"cell {n}" for n in entities)
-            if name in _FACING_TESTS or name == "in_front_of":
-                yield from (f"facing {n}" for n in entities)
-        case Measure(args=args):
-            yield from (f"cell {n}" for arg in args for n in _numbers(arg))
-        case Sees(viewer=viewer, target=target, facing=facing):
-            yield from (f"cell {n}" for one in (viewer, target) for n in _numbers(one))
-            if facing is None:
-                yield from (f"facing {n}" for n in _numbers(viewer))
-        case CellOf(entity=entity) | CellBeside(entity=entity):
-            yield from (f"cell {n}" for n in _numbers(entity))
-
-
-def _numbers(term: Term) -> range:
-    """The entities that a term can stand for."""
-    return term.type.values if term.type.kind == "entity" else range(0)

@@ -85,11 +85,13 @@ class Read:
     `teacher.one_of`, `let.dance[0].move`, `memory.attempt.filled`, `prev.0`, `ann.trust(bob)`.
 
     `nothing` is the number in a register that may hold nothing when it does; `type` is that of what it holds else.
+    `may_miss`: what `prev` noted in it may have found nothing then.
     """
 
     type: Type
     path: str
     nothing: int | None = None
+    may_miss: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -683,7 +685,7 @@ def is_looked_for(part: object) -> bool:
     if isinstance(part, Quantification):
         return part.op in ("first", "pick", "nearest")
     if isinstance(part, Read):
-        return part.path.startswith(NOTED) or part.nothing is not None
+        return part.may_miss or part.nothing is not None
     return isinstance(part, ReadEach) and part.may_miss
 
 

@@ -328,7 +328,8 @@ class _Author:
         for thing in self.declared.several:
             if self.often(0.6):
                 name = f"the_{thing.name}"
-                made[name] = f"pick({thing.name})"
+                nearest = f"nearest(o in {thing.name} to agent)"
+                made[name] = nearest if self.often(0.3) else f"pick({thing.name})"
                 self.declared.lets[name] = thing.name
         if self.often(0.4):
             made["spot"] = f"pick(c in cells where {self.phrases.of_cell(where)})"
@@ -530,7 +531,7 @@ class _Author:
             member: dict[str, Any] = {}
             if name in self.declared.groups:
                 member["count"] = self.declared.groups[name]
-            member |= self.look()
+            member |= self.look(alone=name not in self.declared.groups)
             frame = self.declared.follows.get(name)
             if frame is not None:
                 member["frame"] = frame.name
@@ -572,14 +573,19 @@ class _Author:
         }
         return fillings[type_]()
 
-    def look(self) -> dict[str, Any]:
-        """Where somebody is put and how he looks."""
+    def look(self, alone: bool) -> dict[str, Any]:
+        """Where somebody is put and how he looks; beside one thing there is room for one."""
         made: dict[str, Any] = {}
         if self.often(0.3):
             made["kind"] = self.rng.choice(("guide", "child"))
         if self.often(0.4):
             made["place"] = self.rng.choice(
-                ("left_half", "right_half", "anywhere where not here.in_line(agent)")
+                (
+                    "left_half",
+                    "right_half",
+                    "anywhere where not here.in_line(agent)",
+                    *(f"next_to({name})" for name in self.declared.lets if alone),
+                )
             )
         if self.often(0.4):
             made["facing"] = self.rng.choice(("down", "pick(left | up)", "toward(agent)"))

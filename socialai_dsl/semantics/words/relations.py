@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Final, cast
+from dataclasses import dataclass, replace
+from functools import partial
+from operator import eq
+from typing import Final, Literal, cast
 
 from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.groups import check_points
@@ -31,6 +33,25 @@ from socialai_dsl.semantics.terms import (
     number,
 )
 from socialai_dsl.semantics.words.use import Use, Value
+
+Cell = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relation(Value):
+    """A relation for which the engine has a test.
+
+    Attributes:
+        turned: whose direction it follows from, besides where both are.
+        through: what else: what stands `between` them, or the `way` that is free.
+        most: as `here.WORD(x)`, on how many cells it holds at most; None: on any number.
+        known: whether it holds between two cells, as far as that decides it; None: it does not.
+    """
+
+    turned: tuple[Literal["subject", "object"], ...] = ()
+    through: Literal["between", "way"] | None = None
+    most: int | None = None
+    known: Callable[[Cell, Cell], bool | None] = lambda _one, _other: None
 
 
 def _related(use: Use) -> Term:
@@ -123,39 +144,36 @@ def _direction(use: Use) -> Term:
     return Measure(DIRECTION, "dir_to", (subject, use.resolver.somewhere(use.args[0], use.scope)))
 
 
-def _test(
-    name: RelationName,
-    doc: str,
-    *,
-    candidate: bool = False,
-    cell: bool = False,
-    also: tuple[str, ...] = (),
-    meaning: Callable[[Use], Term] = _related,
-) -> Value:
-    """A relation for which the engine has a test."""
-    return Value(
-        name, "entity", ("entities",), "condition", doc,
-        candidate=candidate, cell=cell, also=also, meaning=meaning,
-    )  # fmt: skip
+def _is_next_to(one: Cell, other: Cell) -> bool:
+    return abs(one[0] - other[0]) + abs(one[1] - other[1]) == 1
+
+
+def _may_be_in_line(one: Cell, other: Cell) -> bool | None:
+    return None if one[0] == other[0] or one[1] == other[1] else False
+
+
+_test = partial(Relation, subject="entity", takes=("entities",), gives="condition", meaning=_related)
 
 
 RELATIONS: Final = (
-    _test("at", "on the same cell", candidate=True, also=("reaches", "on", "in_cell")),
-    _test("next_to", "one cell away, whatever the facing", candidate=True,
+    _test("at", doc="on the same cell", candidate=True, also=("reaches", "on", "in_cell"), most=1, known=eq),
+    _test("next_to", doc="one cell away, whatever the facing", candidate=True, most=4, known=_is_next_to,
           also=("near", "close_to", "beside", "adjacent", "adjacent_to", "by")),
-    _test("in_front_of", "on the cell before x", candidate=True, meaning=_related_bodies),
-    _test("faces", "x is on the cell ahead"),
-    _test("faces_toward", "turned to where face(x) would end"),
+    _test("in_front_of", doc="on the cell before x", candidate=True, meaning=_related_bodies, most=1,
+          turned=("object",)),
+    _test("faces", doc="x is on the cell ahead", turned=("subject",)),
+    _test("faces_toward", doc="turned to where face(x) would end", turned=("subject",)),
     Value("joint_attention", "member", ("entity", "entities"), "condition", "both look at x, or at the same object",
           optional=1, meaning=_joint_attention),
     Value("points_at", "member", ("entities",), "condition",
           "it points at the cell of x, or the way x lies straight", also=("points_to",), meaning=_points_at),
-    _test("eye_contact", "same row or column, each turned to the other", meaning=_related_bodies),
-    _test("in_line", "same row or same column", cell=True),
-    _test("can_reach", "a free path to x, or next to x, exists now"),
-    _test("unobstructed", "in line with x and nothing opaque between", cell=True),
-    Value("looks_at", "member", ("entities",), "condition", "x is straight ahead in its view, nothing opaque between",
-          also=("looking_at",), meaning=_looks_at),
+    _test("eye_contact", doc="same row or column, each turned to the other", meaning=_related_bodies,
+          turned=("subject", "object")),
+    _test("in_line", doc="same row or same column", cell=True, known=_may_be_in_line),
+    _test("can_reach", doc="a free path to x, or next to x, exists now", through="way"),
+    _test("unobstructed", doc="in line with x and nothing opaque between", cell=True, through="between"),
+    _test("looks_at", subject="member", doc="x is straight ahead in its view, nothing opaque between",
+          also=("looking_at",), meaning=_looks_at, turned=("subject",), through="between"),
     Value("sees", "member", ("entities",), "condition", "x is in its view square",
           also=("can_see", "see"), meaning=_sees),
     Value("would_see", "member", ("entities", "direction"), "condition", "x would be, if it faced this direction",

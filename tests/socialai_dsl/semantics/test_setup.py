@@ -43,6 +43,13 @@ def test_a_place_may_need_a_drawn_value_which_needs_a_colour(meaning):
     )
 
 
+def test_who_is_nearest_is_asked_once_all_of_them_have_their_places(meaning):
+    cast = {"guide": {"place": "next_to(goal)"}}
+    names = order(meaning(cast=cast, let={"goal": "nearest(d in doors to agent)"}))
+    assert max(names.index(f"placing {n}") for n in (0, 2, 3, 4, 5)) < names.index("let.goal")
+    assert names.index("let.goal") < names.index("placing 1")
+
+
 def test_each_wall_has_one(meaning):
     regions = [p.regions for p in places(meaning()) if p.entity > 1]
     assert [(r[0].name, r[0].side, r[0].margin) for r in regions] == [
