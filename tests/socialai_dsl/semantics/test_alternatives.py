@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Compare, Const, Quantification, Read, Select
+from socialai_dsl.semantics.plans import Drawn
 
 BASE = """
 npc: base
@@ -35,7 +34,6 @@ facing: up
 place: left_half
 with: {line: That way, near: false, goal: pick(doors), steps: 1}
 """
-THREE = ONE.replace("one", "three").replace("steps: 1", "steps: 5")
 
 
 @pytest.fixture
@@ -51,88 +49,8 @@ def files(tmp_path):
     return written
 
 
-def of_guide(checked, kind):
-    return [item for item in checked.setup if isinstance(item, kind) and getattr(item, "entity", 1) == 1]
-
-
 def drawn(checked):
     return {item.path: item.value for item in checked.setup if isinstance(item, Drawn)}
-
-
-def asks_for(term):
-    """The number of the file that a condition asks for."""
-    assert isinstance(term, Compare)
-    assert term.left == Read(term.left.type, "guide.one_of")
-    return term.right.value
-
-
-def test_the_file_is_drawn_first_of_all_that_depends_on_it(meaning, files):
-    checked = meaning(**files(ONE, TWO))
-    value = drawn(checked)["guide.one_of"]
-    assert isinstance(value.term, Quantification)
-    assert (value.site, value.term.op, value.term.type.words) == ("cast.guide.one_of", "pick", ("one", "two"))
-
-
-def test_what_is_alike_depends_on_nothing(meaning, files):
-    checked = meaning(**files(ONE, ONE.replace("one", "two")))
-    assert [placing.when for placing in of_guide(checked, Placing)] == [None]
-    assert [coloring.when for coloring in of_guide(checked, Coloring)] == [None]
-    guide = checked.entities[1]
-    assert guide.kind_drawn is None
-    assert isinstance(guide.name, Const)
-
-
-def test_where_files_differ_there_is_one_for_each_of_them(meaning, files):
-    checked = meaning(**files(ONE, TWO))
-    assert [asks_for(placing.when) for placing in of_guide(checked, Placing)] == [0, 1]
-    assert [asks_for(coloring.when) for coloring in of_guide(checked, Coloring)] == [0, 1]
-    assert [asks_for(facing.when) for facing in of_guide(checked, Facing)] == [0, 1]
-
-
-def test_files_that_are_alike_share_theirs(meaning, files):
-    placings = of_guide(meaning(**files(ONE, TWO, THREE)), Placing)
-    either, only = (placing.when for placing in placings)
-    assert [asks_for(term) for term in either.args] == [0, 2]
-    assert asks_for(only) == 1
-
-
-def test_names_and_kinds_are_selected(meaning, files):
-    checked = meaning(**files(ONE, TWO))
-    guide = checked.entities[1]
-    name = drawn(checked)["guide.name"].term
-    assert isinstance(name, Select)
-    assert name.type.words == ("Guide", "Tim")
-    assert guide.name == Read(name.type, "guide.name")
-    assert guide.kind == "teacher or liar"
-    assert isinstance(guide.kind_drawn, Select)
-    assert guide.kind_code == 1
-
-
-def test_a_slot_is_a_register_that_selects_among_what_fills_it(meaning, files):
-    found = drawn(meaning(**files(ONE, TWO)))
-    goal = found["guide.goal"].term
-    assert isinstance(goal, Select)
-    assert {type(value) for value in (*goal.values, goal.default)} == {Read, Quantification}
-
-
-def test_a_slot_filled_alike_is_not_selected(meaning, files):
-    alike = drawn(meaning(**files(ONE, TWO)))["guide.steps"].term
-    assert (type(alike), alike.value) == (Const, 1)
-    steps = drawn(meaning(**files(ONE, TWO, THREE)))["guide.steps"].term
-    assert [value.value for value in (*steps.values, steps.default)] == [5, 1]
-
-
-def test_a_condition_holds_if_it_does_in_the_file_that_was_drawn(meaning, files):
-    checked = meaning(**files(ONE, TWO))
-    when = checked.frames[0].states[0].then[0].when.term
-    near, _ = when.args
-    assert asks_for(near.right) == 0
-
-
-def test_a_text_is_the_one_of_the_file_that_was_drawn(meaning, files):
-    (rule,) = meaning(**files(ONE, TWO)).frames[0].states[0].then
-    (text,) = rule.say.parts
-    assert text.type.words == ("That way", "This way") or text.type.words == ("This way", "That way")
 
 
 @pytest.mark.parametrize(

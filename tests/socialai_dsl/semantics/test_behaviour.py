@@ -4,143 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.terms import Const, Heard, Logic, Operation, Quantification, Read
+from socialai_dsl.semantics.terms import Operation
 from socialai_dsl.semantics.words import ACTIVITIES
 from socialai_dsl.vocabulary import PRIMITIVES
 
 
 def frame(**states):
     return {"talk": {"states": {name: body or {} for name, body in states.items()}}}
-
-
-def played(meaning, frames, cast=None, **sections):
-    checked = meaning(frames=frames, cast=cast or {"guide": {"frame": "talk"}}, **sections)
-    return checked.frames[0]
-
-
-def test_every_member_plays_its_own_copy(meaning):
-    frames = {"talk": {"slots": {"line": "text"}, "states": {"a": {"then": [{"say": "<line>"}]}}}}
-    cast = {
-        "guide": {"frame": "talk", "with": {"line": "Hi"}},
-        "other": {"frame": "talk", "with": {"line": "Ho"}},
-        "agent": {},
-    }
-    checked = meaning(frames=frames, cast=cast)
-    assert [(f.member, f.states[0].then[0].say.parts) for f in checked.frames] == [
-        ("guide", ("Hi",)),
-        ("other", ("Ho",)),
-    ]
-
-
-def test_a_rule_is_named_by_its_address_or_id(meaning):
-    frames = frame(a={"first": [{"goto": "b"}], "then": [{"say": "x", "id": "greet"}]}, b=None)
-    plan = played(meaning, frames)
-    assert plan.states[0].first[0].name == "guide.talk.a.first[0]"
-    assert plan.states[0].then[0].name == "greet"
-    assert plan.states[0].then[0].site == "guide/frames.talk.states.a.then[greet]"
-
-
-def test_the_first_state_is_the_start(meaning):
-    assert played(meaning, frame(a={"then": [{"goto": "b"}]}, b=None)).start == "a"
-
-
-def test_picks_in_a_rule_have_the_site_of_who_plays(meaning):
-    plan = played(meaning, frame(a={"then": [{"say": "Try <pick(colors)> or <pick(colors)>"}]}))
-    line = plan.states[0].then[0].say
-    assert line.site == "guide/frames.talk.states.a.then[0].say"
-    assert [p.ordinal for p in line.parts if isinstance(p, Quantification)] == [0, 1]
-
-
-def test_a_text_slot_that_is_the_whole_line_has_the_slots_site(meaning):
-    frames = {
-        "talk": {
-            "slots": {"line": "text"},
-            "states": {"a": {"then": [{"say": "<line>"}, {"say": "So <line>"}]}},
-        }
-    }
-    plan = played(meaning, frames, {"guide": {"frame": "talk", "with": {"line": "<pick(colors)>!"}}})
-    whole, part = (rule.say for rule in plan.states[0].then)
-    assert (whole.site, whole.parts[0].site) == ("cast.guide.with.line", "")
-    assert (part.site, part.parts[1].site) == (
-        "guide/frames.talk.states.a.then[1].say",
-        "cast.guide.with.line",
-    )
-
-
-def test_a_bool_slot_is_put_in_wherever_it_is_used(meaning):
-    frames = {"talk": {"slots": {"near": "bool"}, "states": {"a": {"then": [{"when": "near", "say": "x"}]}}}}
-    plan = played(meaning, frames, {"guide": {"frame": "talk", "with": {"near": "pick(true | false)"}}})
-    assert plan.states[0].then[0].when.term.site == "cast.guide.with.near"
-
-
-def test_hears_with_a_value_becomes_a_condition(meaning):
-    rule = {"hears": "Here is <n>", "when": "next_to(agent)", "say": "x"}
-    plan = played(meaning, frame(a={"then": [rule]}), let={"n": "pick(1..3)"})
-    rule = plan.states[0].then[0]
-    assert rule.hears == ()
-    choices, near = rule.when.term.args
-    assert isinstance(choices, Logic)
-    assert len(choices.args) == 3
-    heard, equal = choices.args[0].args
-    assert isinstance(heard, Heard)
-    assert heard.patterns[0].pairs == {(1, 6)}
-    assert equal.left == Read(equal.left.type, "let.n")
-    assert near.name == "next_to"
-
-
-def test_hears_takes_alternatives_and_any_noun(meaning):
-    plan = played(meaning, frame(a={"then": [{"hears": ["How are you?", "where is <noun>"], "say": "x"}]}))
-    one, many = plan.states[0].then[0].hears
-    assert one.pairs == {(2, 2)}
-    assert many.pairs == {(0, n) for n in range(9)}
-
-
-def test_npcs_hear_each_other(meaning):
-    frames = frame(a={"then": [{"hears": "hello there", "say": "x"}]})
-    frames["greet"] = {"steps": [{"say": "Hello there!"}]}
-    plan = played(meaning, frames, {"guide": {"frame": "talk"}, "other": {"frame": "greet"}, "agent": {}})
-    (pattern,) = plan.states[0].then[0].hears
-    assert (pattern.pairs, pattern.said_by_npcs) == (frozenset(), {"Hello there!"})
-
-
-def test_steps(meaning):
-    frames = {
-        "talk": {
-            "steps": [
-                {"do": "stay", "for": 2},
-                {"do": "face(agent)", "until": "eye_contact(agent)"},
-                {"say": "x", "state": "end", "for": "ever"},
-            ]
-        }
-    }
-    steps = played(meaning, frames).steps
-    assert [s.duration for s in steps] == [2, None, -1]
-    assert [s.state for s in steps] == [None, None, "end"]
-    assert steps[1].until.site == "guide/frames.talk.steps[1].until"
-
-
-def test_wander_chooses_among_three_actions(meaning):
-    activity = played(meaning, frame(a={"do": "wander"})).states[0].activity
-    assert (activity.name, [a.value for a in activity.args], activity.weights) == (
-        "choose",
-        [2, 0, 1],
-        (1, 1, 1),
-    )
-
-
-def test_choose_has_weights(meaning):
-    activity = played(meaning, frame(a={"do": "choose(left | 3 * forward)"})).states[0].activity
-    assert ([a.value for a in activity.args], activity.weights) == ([0, 2], (1, 3))
-
-
-def test_effects_on_a_group(meaning):
-    plan = played(
-        meaning, frame(a={"then": [{"cause": ["doors.open", "exit.become(locked)", "self.vanish"]}]})
-    )
-    opened, locked, gone = plan.states[0].then[0].causes
-    assert [e.value for e in opened.entities] == [2, 3, 4, 5]
-    assert (locked.name, locked.value.value) == ("become", 2)
-    assert gone.entities[0].value == 1
 
 
 def test_an_unplayed_frame_is_checked_too(mistakes):
@@ -151,12 +21,6 @@ def test_a_slot_is_looked_at_though_the_frame_never_uses_it(mistakes):
     frames = {"talk": {"slots": {"line": "text"}, "states": {"a": {}}}}
     found = mistakes(frames=frames, cast={"guide": {"frame": "talk", "with": {"line": "<exitt.color>"}}})
     assert [line[:4] for line in found] == ["S201"]
-
-
-def test_what_the_agent_says_is_spelled_as_in_the_grammar(meaning):
-    frames = {"talk": {"steps": [{"say": "how are YOU?"}]}}
-    plan = played(meaning, frames, {"guide": {}, "agent": {"frame": "talk"}})
-    assert plan.steps[0].say.parts == ("How are you",)
 
 
 def register(meaning, start, change, horizon=20):
@@ -185,10 +49,6 @@ def test_growth_without_end_is_a_mistake(mistakes):
     frames = {"talk": {"let": {"n": 1}, "states": {"a": {"then": [{"set": {"n": "n * 3"}}]}}}}
     found = mistakes(frames=frames, cast={"guide": {"frame": "talk"}})
     assert [line[:4] for line in found] == ["S106"]
-
-
-def test_a_constant_is_no_pick(meaning):
-    assert isinstance(register(meaning, "pick(1..3)", 2)[1].term, Const)
 
 
 def test_registers_of_an_unplayed_frame_are_looked_at_but_never_drawn(meaning, mistakes):

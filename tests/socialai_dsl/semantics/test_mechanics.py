@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.terms import Const, FieldOf, Measure, PokedNow, walk
-from socialai_dsl.semantics.terms import Test as Relation
-
 THINGS = {
     "marble": {"type": "marble", "place": "anywhere"},
     "engines": {
@@ -19,17 +16,6 @@ THINGS = {
     "lever": {"type": "lever", "place": "wall(top)", "timer": 5, "opens": "gate"},
     "gate": {"type": "remote_door", "place": "wall(bottom)"},
 }
-
-
-def test_what_objects_do_to_each_other(meaning):
-    by_key = {}
-    for entity in meaning(objects=THINGS).entities:
-        by_key.setdefault(entity.key, []).append(entity)
-    (lever,), (gate,), engines = by_key["lever"], by_key["gate"], by_key["engines"]
-    assert (lever.timer, lever.opens) == (5, (gate.number,))
-    assert [engine.exclusive for engine in engines] == [tuple(engine.number for engine in engines)] * 2
-    assert all(engine.pushed_by_rolling for engine in engines)
-    assert not by_key["marble"][0].pushed_by_rolling
 
 
 @pytest.mark.parametrize(
@@ -52,40 +38,6 @@ def test_what_they_cannot_do(examine, key, changes, code):
     objects = {**THINGS, key: {**THINGS[key], **changes}}
     found = examine(objects=objects, room={"size": 8}).diagnostics
     assert [d.code for d in found] == [code] * (code is not None)
-
-
-@pytest.fixture
-def doing(meaning):
-    """The activity of the guide."""
-
-    def activity(do):
-        frames = {"act": {"states": {"s": {"do": do}}}}
-        checked = meaning(objects=THINGS, frames=frames, cast={"guide": {"frame": "act"}})
-        return checked.frames[0].states[0].activity
-
-    return activity
-
-
-def test_pointing_at_something_is_pointing_its_way(doing):
-    activity = doing("point(marble)")
-    assert activity.name == "point"
-    (way,) = activity.args
-    assert isinstance(way, Measure)
-    assert (way.name, way.args[0].value) == ("dir_to", 1)
-
-
-@pytest.mark.parametrize(
-    ("do", "name", "arguments"),
-    [
-        ("push(marble, up)", "push", 2),
-        ("follow(agent)", "go_next_to", 1),
-        ("flee(agent)", "flee", 1),
-        ("stop_pointing", "stop_pointing", 0),
-    ],
-)
-def test_activities(doing, do, name, arguments):
-    activity = doing(do)
-    assert (activity.name, len(activity.args)) == (name, arguments)
 
 
 @pytest.mark.parametrize(
@@ -111,27 +63,6 @@ def test_a_frame_that_nobody_plays_may_point(examine):
     frames = {"act": {"states": {"s": {"do": "point(marble)"}}}}
     found = examine(objects=THINGS, frames=frames, cast={"guide": None, "agent": {}}).diagnostics
     assert "S204" not in [d.code for d in found]
-
-
-def test_both_look_at_the_same(outcome_term):
-    term = outcome_term("guide.joint_attention(agent, marble)", objects=THINGS)
-    looks = [part for part in walk(term) if isinstance(part, Relation)]
-    assert [(look.name, look.subject.value) for look in looks] == [("looks_at", 1), ("looks_at", 0)]
-
-
-def test_without_an_object_any_will_do(outcome_term):
-    term = outcome_term("guide.joint_attention(agent)", objects=THINGS)
-    looks = [part for part in walk(term) if isinstance(part, Relation)]
-    assert len({look.object.value for look in looks}) == 4 + 5  # the doors, and the things
-
-
-def test_who_toggled(outcome_term):
-    asked = {"objects": THINGS, "let": {"one": "pick(agent | guide)"}}
-    term = outcome_term("lever.toggled_by(one)", **asked)
-    assert [type(part) for part in walk(term) if isinstance(part, PokedNow)] == [PokedNow]
-    (used,) = [part for part in walk(term) if isinstance(part, FieldOf)]
-    assert isinstance(used.entity, Const)
-    assert (used.name, used.entity.value) == ("toggled", 1)
 
 
 @pytest.mark.parametrize(

@@ -87,19 +87,6 @@ def test_rules_of_the_world_set_only_what_the_world_has(examine, name, message):
 # -- rewards --------------------------------------------------------------------------------------------------------
 
 
-def test_what_is_earned(meaning):
-    checked = meaning(
-        reward={"success": "linear(0.25)", "each_step": -0.005},
-        state={"visits": 0},
-        rules=[{"when": "t == 1", "set": {"visits": "min(visits + 1, 3)"}, "reward": -20}],
-        outcome=[{"success": "t > 3", "reward": "100 - visits"}, {"success": "t > 2", "reward": 40}],
-    )
-    assert (checked.slope, checked.each_step, checked.rules[0].reward) == (250, -5000, -20)
-    graded, plain = checked.outcomes
-    assert graded.graded is not None
-    assert (plain.graded, plain.percent) == (None, 40)
-
-
 @pytest.mark.parametrize(
     ("sections", "code"),
     [

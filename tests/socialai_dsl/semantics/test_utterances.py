@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.frontend import load
 from socialai_dsl.vocabulary import COLORS, normal, words
 
 
@@ -28,10 +27,6 @@ def test_a_value_that_cannot_be_said_is_a_warning_if_it_changes(examine):
     assert result.checked is not None
 
 
-def test_a_noun_may_be_a_number(outcome_term):
-    assert outcome_term('agent.said("Here is 2")').pattern.pairs == {(1, 7)}
-
-
 @pytest.mark.parametrize(
     ("text", "found"),
     [
@@ -43,27 +38,6 @@ def test_a_noun_may_be_a_number(outcome_term):
 )
 def test_words_are_letters_digits_and_apostrophes(text, found):
     assert words(text) == found
-
-
-def test_vocabulary_is_in_order_of_the_file():
-    vocabulary = load("talkitout").checked.words_in_order
-    assert vocabulary[:6] == ("where", "is", "open", "which", "how", "are")
-    assert vocabulary[6:9] == ("sesame", "the", "exit")
-    rest = vocabulary[vocabulary.index("sofa") + 1 :]
-    assert rest == (
-        "gandalf", "john", "jack", "agent", "i", "am", "fine", "ask", "go", "to",
-        "red", "green", "blue", "purple", "yellow", "grey", "door",
-    )  # fmt: skip
-
-
-def test_hidden_npcs_have_the_same_vocabulary():
-    assert load("talkitout").checked.words_in_order == load("talkitout+unsocial").checked.words_in_order
-
-
-def test_words_that_run_together_are_words_of_their_own(meaning):
-    frames = {"talk": {"states": {"a": {"then": [{"say": "very <exit.color>ish"}]}}}}
-    vocabulary = meaning(frames=frames, cast={"guide": {"frame": "talk"}}).words_in_order
-    assert {"redish", "greyish"} <= set(vocabulary)
 
 
 NOT_ONE_LINE = ("A\nB", "A\rB", "A\tB", "\nA\tB\n")
