@@ -53,11 +53,7 @@ class _Part:
 
     def without(self, layout: dict[str, Any]) -> dict[str, Any]:
         """A copy of a layout that leaves it open."""
-        copied = deepcopy(layout)
-        inner = _at(copied, self.where)
-        for key in self._keys:
-            inner.pop(key, None)
-        return copied
+        return _without(layout, self.where, self._keys)  # type: ignore[no-any-return]
 
     def alone(self, value: Any, room: Mapping[str, Any]) -> dict[str, Any]:
         """A layout that gives this value, and nothing else of a room."""
@@ -204,6 +200,15 @@ def _at(layout: Mapping[str, Any], where: Path) -> Any:
     for key in where:
         inner = inner[key]
     return inner
+
+
+def _without(layout: Any, where: Path, keys: Sequence[str]) -> Any:
+    """A layout in which one place lacks keys; all other places are those of the layout itself."""
+    if not where:
+        return {key: value for key, value in layout.items() if key not in keys}
+    changed = layout.copy()
+    changed[where[0]] = _without(layout[where[0]], where[1:], keys)
+    return changed
 
 
 def _only(value: Mapping[str, Any]) -> Any:

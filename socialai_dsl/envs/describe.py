@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,62 +36,70 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
     since the reset), and `pending`: for NPCs, what was said near them since their last turn, as utterance classes, or
     as [class, speaker, noun] where rules ask who spoke.
     """
-    addresses = addresses_of(program)
+    addresses, held = addresses_of(program), registers.tolist()
     state: dict[str, Any] = {
-        "t": int(registers[Register.T]),
-        "room": {"width": int(registers[Register.WIDTH]), "height": int(registers[Register.HEIGHT])},
+        "t": held[Register.T],
+        "room": {"width": held[Register.WIDTH], "height": held[Register.HEIGHT]},
     }
     for number, entity in enumerate(program.entities):
-        described = _entity(program, registers, number)
+        described, name = _entity(program, held, number), str(entity)
         for key in ("name", "state", "clock", "initial", "timer"):
-            owned = addresses.owned.get((str(entity), key))
+            owned = addresses.owned.get((name, key))
             if owned is not None:
-                described[key] = _value(program, registers, owned)
-        if beliefs := addresses.beliefs.get(str(entity)):
-            described["believes"] = _values(program, registers, beliefs)
-        if looks := addresses.looks.get(str(entity)):
-            described["looks"] = _values(program, registers, looks)
+                described[key] = _value(program, held, owned)
+        if beliefs := addresses.beliefs.get(name):
+            described["believes"] = _values(program, held, beliefs)
+        if looks := addresses.looks.get(name):
+            described["looks"] = _values(program, held, looks)
         if entity.index is None:
             state[entity.key] = described
         else:
             state.setdefault(entity.key, []).append(described)
     if addresses.one_of:
-        state["one_of"] = _values(program, registers, addresses.one_of)
-    state["let"] = _values(program, registers, addresses.plain)
+        state["one_of"] = _values(program, held, addresses.one_of)
+    state["let"] = _values(program, held, addresses.plain)
     for key, acts in addresses.sequences.items():
-        state["let"][key] = [_act(program, registers, acts, k) for k in range(acts.length)]
+        state["let"][key] = [_act(program, held, acts, k) for k in range(acts.length)]
     if addresses.world:
-        state["state"] = _values(program, registers, addresses.world)
+        state["state"] = _values(program, held, addresses.world)
     for place, keys in addresses.kept.items():
         section, _, key = place.partition(".")
-        state.setdefault(section, {})[key] = _values(program, registers, keys)
+        state.setdefault(section, {})[key] = _values(program, held, keys)
     if addresses.memories:
-        state["memory"] = _memories(program, registers, addresses)
+        state["memory"] = _memories(program, held, addresses)
     if state["t"]:
-        state["last"] = _last(program, registers)
-    state["heard"] = history(program, registers)
-    state["pending"] = _pending(program, registers)
+        state["last"] = _last(program, held)
+    state["heard"] = _history(program, held)
+    state["pending"] = _pending(program, held)
     return state
 
 
 def history(program: Program, registers: Row) -> list[str]:
     """Lines heard since the reset, as far as they are kept, oldest first."""
-    log, size = program.header(Header.LOG), program.header(Header.LOG_SIZE)
-    places = int(registers[Register.OLDEST]) + np.arange(int(registers[Register.LOGGED]))
-    return [program.lines[line] for line in registers[log + places % max(size, 1)]]
+    return _history(program, registers.tolist())
 
 
-def _value(program: Program, registers: Row, name: RegisterName) -> Any:
-    return shown(program, name, int(registers[name.register]))
+Held = Sequence[int]
+"""The registers as numbers of Python, which are read faster than an array."""
 
 
-def _values(program: Program, registers: Row, names: Mapping[str, RegisterName]) -> dict[str, Any]:
+def _history(program: Program, registers: Held) -> list[str]:
+    log, size = program.header(Header.LOG), max(program.header(Header.LOG_SIZE), 1)
+    oldest, logged = registers[Register.OLDEST], registers[Register.LOGGED]
+    return [program.lines[registers[log + place % size]] for place in range(oldest, oldest + logged)]
+
+
+def _value(program: Program, registers: Held, name: RegisterName) -> Any:
+    return shown(program, name, registers[name.register])
+
+
+def _values(program: Program, registers: Held, names: Mapping[str, RegisterName]) -> dict[str, Any]:
     return {key: _value(program, registers, name) for key, name in names.items()}
 
 
-def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
+def _entity(program: Program, registers: Held, number: int) -> dict[str, Any]:
     base = FIRST_ENTITY + ENTITY_FIELDS * number
-    field = {name: int(registers[base + name]) for name in Field}
+    field = registers[base : base + ENTITY_FIELDS]
     entity = program.entities[number]
     gone = bool(field[Field.GONE]) or field[Field.X] < 0
     described: dict[str, Any] = {
@@ -109,7 +117,7 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
         if field[Field.LAST] != Body.NONE:
             described["last"] = TURN_WORDS[field[Field.LAST]]
         if field[Field.POINTING]:
-            described["pointing"] = _pointing(int(field[Field.POINTING]))
+            described["pointing"] = _pointing(field[Field.POINTING])
         if field[Field.TOGGLED]:
             described["toggled"] = str(program.entities[field[Field.TOGGLED]])
     elif entity.role == "object" and field[Field.INSIDE]:
@@ -124,7 +132,7 @@ def _pointing(value: int) -> str | list[int]:
     return list(place_of(value)) if value >= CELL else DIRECTIONS[value - 1]
 
 
-def _carried(program: Program, registers: Row, who: int) -> dict[str, Any]:
+def _carried(program: Program, registers: Held, who: int) -> dict[str, Any]:
     """What a member of the cast carries, if anything."""
     for number, entity in enumerate(program.entities):
         carrier = registers[FIRST_ENTITY + ENTITY_FIELDS * number + Field.CARRIER]
@@ -133,40 +141,41 @@ def _carried(program: Program, registers: Row, who: int) -> dict[str, Any]:
     return {}
 
 
-def _act(program: Program, registers: Row, acts: ActRegisters, k: int) -> list[Any]:
+def _act(program: Program, registers: Held, acts: ActRegisters, k: int) -> list[Any]:
     """One element of a sequence or memory: its move and its utterance, None for silence."""
     utterance = acts.utterances.get(k)
     said = _value(program, registers, utterance) if utterance is not None else None
     return [_value(program, registers, acts.moves[k]), said or None]
 
 
-def _memories(program: Program, registers: Row, addresses: Addresses) -> dict[str, list[Any]]:
-    held = {key: int(registers[name.register]) for key, name in addresses.filled.items()}
+def _memories(program: Program, registers: Held, addresses: Addresses) -> dict[str, list[Any]]:
+    held = {key: registers[name.register] for key, name in addresses.filled.items()}
     return {
         key: [_act(program, registers, acts, k) for k in range(acts.length - held[key], acts.length)]
         for key, acts in addresses.memories.items()
     }
 
 
-def _last(program: Program, registers: Row) -> dict[str, Any]:
+def _last(program: Program, registers: Held) -> dict[str, Any]:
     """What the agent did in the last step; the next one may still ask for it (`prev`)."""
-    template, noun = int(registers[Register.TEMPLATE]), int(registers[Register.NOUN])
+    template, noun = registers[Register.TEMPLATE], registers[Register.NOUN]
     silent = template < 0 or noun < 0
-    poked = int(registers[Register.POKED])
+    poked = registers[Register.POKED]
     return {
-        "action": ACTIONS[int(registers[Register.ACTION])],
+        "action": ACTIONS[registers[Register.ACTION]],
         "said": None if silent else utterance_text(program, 1 + template * program.sentences.fillings + noun),
         "poked": str(program.entities[poked]) if poked >= 0 else None,
     }
 
 
-def _pending(program: Program, registers: Row) -> dict[str, list[Any]]:
+def _pending(program: Program, registers: Held) -> dict[str, list[Any]]:
     words = entry_words(program)
     pending: dict[str, list[Any]] = {}
     for row in program.table(Header.FRAME_AT).tolist():
         inbox = row[FrameColumn.INBOX]
-        if count := int(registers[inbox]):
-            heard = registers[inbox + 1 : inbox + 1 + words * count].reshape(count, words).tolist()
+        if count := registers[inbox]:
+            places = range(inbox + 1, inbox + 1 + words * count, words)
+            heard = [registers[place : place + words] for place in places]
             entries = [entry[0] if words == 1 else _heard_entry(program, *entry) for entry in heard]
             pending[str(program.entities[row[FrameColumn.ENTITY]])] = entries
     return pending

@@ -134,7 +134,7 @@ def pins_of(program: Program, layout: Mapping[str, Any], others: Sequence[str] =
 class _Layout:
     def __init__(self, program: Program, others: Sequence[str]) -> None:
         self.program = program
-        self.row = np.full(program.header(Header.REGISTERS), UNPINNED, REGISTER)
+        self.row = [UNPINNED] * program.header(Header.REGISTERS)
         self.addresses = addresses_of(program)
         self.others = (*others, *_OTHER_KEYS)
         self.names = [str(entity) for entity in program.entities]
@@ -164,7 +164,7 @@ class _Layout:
         self._last(layout.get("last"))
         self._heard(layout.get("heard"))
         self._pending(layout.get("pending"))
-        return self.row
+        return np.array(self.row, REGISTER)
 
     def _entries(self, key: str, given: Any) -> Iterator[tuple[str, Any]]:
         """The entries of a mapping, none where nothing is given."""
@@ -399,7 +399,7 @@ class _Layout:
         _only("last", given, ("action", "said", "poked"))
         if given.get("action") is not None:
             self.row[Register.ACTION] = word("last.action", given["action"], ACTIONS)
-            self._set(0, Field.LAST, int(self.row[Register.ACTION]))
+            self._set(0, Field.LAST, self.row[Register.ACTION])
         if given.get("said") is not None:
             self._said(utterance_number(self.program, given["said"], "last.said"))
         if given.get("poked") is not None:
@@ -412,7 +412,7 @@ class _Layout:
         template, noun = divmod(pair, self.program.sentences.fillings)
         self.row[Register.UTTERANCE] = utterance
         self.row[Register.TEMPLATE], self.row[Register.NOUN] = template, noun
-        self.row[Register.CLASS] = self.program.table(Header.CLASS_AT)[template, noun]
+        self.row[Register.CLASS] = int(self.program.table(Header.CLASS_AT)[template, noun])
 
     # --- what was heard ---
 
@@ -429,6 +429,8 @@ class _Layout:
         self.row[Register.LOGGED] = min(len(given), size)
 
     def _pending(self, given: Any) -> None:
+        if given is None:
+            return
         inboxes = {
             str(self.program.entities[row[FrameColumn.ENTITY]]): row[FrameColumn.INBOX]
             for row in self.program.table(Header.FRAME_AT).tolist()

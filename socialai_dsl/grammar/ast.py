@@ -84,9 +84,16 @@ def _is_node(kind: type) -> bool:
     return hasattr(kind, "__dataclass_fields__") and not issubclass(kind, Leaf)
 
 
+_PLAIN: Final = {"str", "int", "bool", "float", "None", "tuple", "list", "frozenset", "DataPath"}
+"""The words of the annotations of fields that never hold a node."""
+
+
 @cache
 def _names(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind)) if hasattr(kind, "__dataclass_fields__") else ()
+    """The fields in which nodes may be."""
+    if not hasattr(kind, "__dataclass_fields__"):
+        return ()
+    return tuple(field.name for field in fields(kind) if {*re.findall(r"\w+", str(field.type))} - _PLAIN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
