@@ -144,6 +144,7 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
     }
     if "oracle" in variants_of(name):
         report = play_script(name, rooms, seed, _STATES)
+        unsolved = {room.index for room in report.unsolved}
         figures["oracle"] = {
             "rooms": report.rooms,
             "seed": seed,
@@ -154,6 +155,7 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
             "unsolved": {
                 verdict: len(report.found(verdict)) for verdict in ("unsolvable", "solvable", "undecided")
             },
+            **_by_draw(_load(name), [room not in unsolved for room in range(rooms)], seed),
         }
     if shares := rival_shares(name, rooms, seed):
         figures["rivals"] = shares
@@ -174,8 +176,31 @@ def rival_shares(name: str, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any
     for rival in loaded.scenario.rivals:
         won = solved_by_script(compile_loaded(rival_of(loaded, rival)), Effort(rooms, seed))
         error = float((won.mean() * (1 - won.mean()) / rooms) ** 0.5)
-        found[rival] = {"rooms": rooms, "success_rate": float(won.mean()), "success_rate_se": error}
+        found[rival] = {
+            "rooms": rooms,
+            "success_rate": float(won.mean()),
+            "success_rate_se": error,
+            **_by_draw(loaded, won, seed),
+        }
     return found
+
+
+def _by_draw(loaded: "Loaded", won: "Sequence[bool] | NDArray[np.bool_]", seed: int) -> dict[str, Any]:
+    """Success for each value of the draws by which a scenario has its results told apart, if it has any."""
+    import numpy as np
+
+    from socialai_dsl.analysis.rooms import rooms_by_draw
+    from socialai_dsl.checking.loaded import LoadedScenario
+
+    if not isinstance(loaded, LoadedScenario):
+        return {}
+    found: dict[str, dict[str, Any]] = {}
+    for (draw, value), rooms in rooms_by_draw(loaded, len(won), seed).items():
+        own = np.asarray(won)[rooms]
+        error = float((own.mean() * (1 - own.mean()) / len(own)) ** 0.5)
+        figures = {"rooms": len(own), "success_rate": float(own.mean()), "success_rate_se": error}
+        found.setdefault(draw, {})[value] = figures
+    return {"results_by": found} if found else {}
 
 
 def _measurements(folder: Path) -> Mapping[str, Any]:

@@ -141,6 +141,7 @@ def _facts(name: str, loaded: Loaded, data: Mapping[str, Any], link: str) -> lis
     ]
     if not isinstance(playable, ProgramSuite):
         rows.append(("earshot", code(data.get("earshot", "next_to"))))
+        rows.append(("results by", flow(data["results_by"]) if "results_by" in data else ""))
     rows.append(("observed", entries(data.get("observe") or {})))
     return ["| | |", "|---|---|", *(f"| {key} | {value} |" for key, value in rows if value)]
 
@@ -177,14 +178,25 @@ def _measured(measured: Mapping[str, Any] | None) -> list[str]:
     if script := measured.get("oracle"):
         length = f"{script['mean_length']:.1f} steps a success"
         rows.append(("own script", _share(script), length, f"{script['rooms']:,} rooms"))
+        rows += _rows_apart(script)
     for name, rival in measured.get("rivals", {}).items():
         rows.append((f"rival {code(name)}", _share(rival), "", f"{rival['rooms']:,} rooms"))
+        rows += _rows_apart(rival)
     lines = ["## Measured", "", *table(("who", "success", "length", "of"), rows)]
     if script and (counts := {v: n for v, n in script["unsolved"].items() if n}):
         found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         lines += ["", f"Rooms that the script does not solve were searched: {found}. No policy succeeds in more than "
                   f"{script['ceiling']:.2%} of these rooms."]  # fmt: skip
     return lines
+
+
+def _rows_apart(figures: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """A row for each value of the draws by which results are told apart."""
+    return [
+        (f"… with {code(f'{draw}: {value}')}", _share(part), "", f"{part['rooms']:,} rooms")
+        for draw, values in figures.get("results_by", {}).items()
+        for value, part in values.items()
+    ]
 
 
 def _share(figures: Mapping[str, Any] | None) -> str:

@@ -6,7 +6,7 @@ A claim rests on the rooms in which it says anything. One that rests on none fai
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
@@ -34,10 +34,11 @@ from socialai_dsl.analysis.reports import (
     rooms_text,
     steps_text,
 )
-from socialai_dsl.analysis.rooms import DrawnRooms, Plan, name_of, random_actions
+from socialai_dsl.analysis.rooms import DrawnRooms, Plan, name_of, random_actions, rooms_by_draw
 from socialai_dsl.analysis.search import Finding, Search, SearchVerdict
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.envs.told_apart import Value
 from socialai_dsl.frontend import rival_of
 from socialai_dsl.program import Program
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
@@ -103,6 +104,17 @@ class Trial:
 
     def check(self, plan: PropertyPlan, effort: Effort) -> Report:
         """Try one property, with the same rooms, for as long as the clock of the effort says."""
+        found = self._check(plan, effort)
+        with suppress(OutOfTimeError):
+            return found.told_apart(self._rooms_apart)
+        return found
+
+    @cached_property
+    def _rooms_apart(self) -> Mapping[Value, NDArray[np.int64]]:
+        """The numbers of the rooms, those of rivals among them, by the draws by whose values results are told apart."""
+        return rooms_by_draw(self.loaded, max(self.effort.rooms, RIVAL_ROOMS), self.effort.seed)
+
+    def _check(self, plan: PropertyPlan, effort: Effort) -> Report:
         if plan.unasked:
             return Report(Verdict.UNASKED, 0, 0, 0, (), plan.unasked, 0)
         match plan.kind:
@@ -272,7 +284,8 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
     if idle.any():
         said += f"; in {int(idle.sum())} of them a success comes of itself"
-    return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests)
+    solved = dict(enumerate(won.tolist()))
+    return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests, so=solved)
 
 
 def _rival(trial: Trial, plan: PropertyPlan) -> Report:
@@ -290,7 +303,8 @@ def _rival(trial: Trial, plan: PropertyPlan) -> Report:
         return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
     verdict = Verdict.HOLDS if won.mean() <= plan.share + 1e-9 else Verdict.FAILS
     against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
-    return Report(verdict, len(won), int((~won).sum()), 0, against, said, len(won))
+    solved = dict(enumerate(won.tolist()))
+    return Report(verdict, len(won), int((~won).sum()), 0, against, said, len(won), so=solved)
 
 
 def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

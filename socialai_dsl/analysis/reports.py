@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from socialai_dsl.analysis.leaks import SOMEBODY
+from socialai_dsl.envs.told_apart import Value
 
 SHOWN: Final = 5
 """How many rooms a report names at most."""
@@ -36,6 +40,8 @@ class Report:
         rests: on how many of the rooms it rests; the others say nothing about it.
         pairs: on how many pairs of episodes, where pairs are compared.
         acts: what is done in the first of `against`, as it is typed, where that is known.
+        so: of each room that says something, where rooms are looked at one by one: whether it is so there, or whether a
+            script or rival solves it. apart: how many are so, of how many, by draws and their values (`results_by`).
     """
 
     verdict: Verdict
@@ -47,6 +53,15 @@ class Report:
     rests: int
     pairs: int = 0
     acts: tuple[str, ...] = ()
+    so: Mapping[int, bool] = field(default_factory=dict, repr=False)
+    apart: Mapping[Value, tuple[int, int]] = field(default_factory=dict)
+
+    def told_apart(self, rooms: Mapping[Value, NDArray[np.int64]]) -> Report:
+        """The same with figures for each value of draws, of which the numbers of the rooms are given."""
+        known = {
+            value: [self.so[k] for k in numbers.tolist() if k in self.so] for value, numbers in rooms.items()
+        }
+        return replace(self, apart={value: (sum(so), len(so)) for value, so in known.items() if so})
 
 
 @dataclass
@@ -80,7 +95,8 @@ class Evidence:
         held, undecided = len(self.held), len(self.undecided)
         verdict = by_share(held, undecided, self.rests, share)
         against = tuple(sorted((*self.against, *self.undecided)))[:SHOWN]
-        return Report(verdict, self.rooms, held, undecided, against, said, self.rests)
+        so = {room: room in self.held for room in (*self.held, *self.against, *self.undecided)}
+        return Report(verdict, self.rooms, held, undecided, against, said, self.rests, so=so)
 
     def _why(self) -> str:
         return ", ".join(f"in {rooms_text(len(rooms))} {why}" for why, rooms in self.void.items())

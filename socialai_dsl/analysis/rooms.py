@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from socialai_dsl.analysis.advance import advance, begin, begin_those_possible
+from socialai_dsl.checking.loaded import LoadedScenario
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.table import Start, Table
+from socialai_dsl.envs.told_apart import Value, rooms_apart, values_apart
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Header, Program, Register
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -134,6 +137,14 @@ class DrawnRooms:
     def won(self) -> NDArray[np.bool_]:
         """Which rooms have ended with a success, (rows,)."""
         return self.ended & self._wins[self.table.state.registers[:, Register.OUTCOME]]
+
+
+def rooms_by_draw(loaded: LoadedScenario, rooms: int, seed: int) -> Mapping[Value, NDArray[np.int64]]:
+    """The numbers of the rooms, 0 to rooms - 1 of a seed, by the draws by whose values results are told apart."""
+    if not (draws := loaded.checked.results_by):
+        return {}
+    table = DrawnRooms.numbered(compile_loaded(loaded), rooms, seed).table
+    return rooms_apart(values_apart(table.describe(room), draws) for room in range(rooms))
 
 
 def name_of(checked: CheckedScenario, number: int) -> str:

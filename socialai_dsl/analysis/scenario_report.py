@@ -107,6 +107,7 @@ class ScenarioReport:
         yield f"{self.scenario}: {self.rooms} rooms of seed {self.seed}"
         for plan, report in self.tried:
             yield f"  {report.verdict.value}: `{plan.text}`: {report.said}"
+            yield from (f"    {line}" for line in lines_apart(plan, report))
             if report.verdict.value != "holds":
                 numbers = ", ".join(map(str, report.against))
                 yield f"    at {_place(plan.span)}" + (f"; rooms {numbers}" if numbers else "")
@@ -168,6 +169,7 @@ class ScenarioReport:
                     "undecided": report.undecided,
                     "against": list(report.against),
                     "said": report.said,
+                    "results_by": _apart(report),
                 }
                 for plan, report in self.tried
             ],
@@ -177,6 +179,20 @@ class ScenarioReport:
             "interrupted": self.interrupted,
             "success": None if self.depth is None else asdict(self.depth),
         }
+
+
+def lines_apart(plan: PropertyPlan, report: Report) -> Iterator[str]:
+    """What was found of a claim for each value of the draws by which results are told apart."""
+    verb = "solves" if plan.kind in ("oracle", "rival") else "so in"
+    for (draw, value), (so, rooms) in report.apart.items():
+        yield f"{draw} {value}: {verb} {so} of {rooms_text(rooms)}"
+
+
+def _apart(report: Report) -> dict[str, dict[str, dict[str, int]]]:
+    found: dict[str, dict[str, dict[str, int]]] = {}
+    for (draw, value), (so, rooms) in report.apart.items():
+        found.setdefault(draw, {})[value] = {"so": so, "rooms": rooms}
+    return found
 
 
 def _coverage(found: Coverage, told: Container[Span]) -> Iterator[str]:

@@ -13,11 +13,10 @@ Row = tuple[str, str]
 
 
 def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
-    """Success with its interval, of each member of a suite as well, then mean length and return."""
-    low, high = figures["success_interval"]
+    """Success with its interval, also of each member of a suite and value of a draw, then mean length and return."""
     manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
-        ("success", f"{figures['success_rate']:.1%}, 95% interval {low:.1%} to {high:.1%} (Wilson)"),
+        ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} (Wilson)"),
         ("episodes", f"{figures['episodes']} of the test set{manner}"),
         ("mean length", f"{figures['mean_length']:.1f} steps"),
         ("mean return", f"{figures['mean_return']:.3f}"),
@@ -25,6 +24,11 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     rows[1:1] = [
         (f"  trial {number}", f"{trial['success_rate']:.1%} of {trial['episodes']}")
         for number, trial in enumerate(figures.get("trials", ()), 1)
+    ]
+    rows[1:1] = [
+        (f"  {draw} {value}", f"{found['success_rate']:.1%} of {found['episodes']}, {_interval(found)}")
+        for draw, values in figures.get("results_by", {}).items()
+        for value, found in values.items()
     ]
     rows[1:1] = [
         (f"  {member}", f"{played['success_rate']:.1%} of the {played['share']:.1%} that played it")
@@ -36,6 +40,11 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     if figures.get("unsolved"):
         rows.append(("unsolved", _numbers(figures["unsolved"])))
     return rows
+
+
+def _interval(figures: Mapping[str, Any]) -> str:
+    low, high = figures["success_interval"]
+    return f"{low:.1%} to {high:.1%}"
 
 
 def _model_rows(figures: Mapping[str, Any]) -> list[Row]:

@@ -15,6 +15,7 @@ from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.factory import compiled, make, make_vec
 from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.envs.told_apart import test_rooms_apart
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy, require_trainer
@@ -94,8 +95,11 @@ class Evaluation:
             "rules": dict(result.rules),
         }
         if self.trials > 1:
-            figures["trials"] = [_trial(*counts) for counts in result.by_trial(self.trials)]
+            figures["trials"] = [_some_of(*counts) for counts in result.by_trial(self.trials)]
         figures |= {**_by_member(self.program, shares), **self.more}
+        for (draw, value), numbers in test_rooms_apart(self.loaded, self.program, result.episodes).items():
+            won = int(result.success[numbers].sum())
+            figures.setdefault("results_by", {}).setdefault(draw, {})[value] = _some_of(won, len(numbers))
         if self.player.is_script:
             # A room that the script does not solve is worth looking at: it can be played again by its number.
             figures["unsolved"] = (~result.success).nonzero()[0].tolist()
@@ -418,8 +422,8 @@ def _of_person(
     )
 
 
-def _trial(successes: int, episodes: int) -> dict[str, Any]:
-    """What came of the episodes of one trial."""
+def _some_of(successes: int, episodes: int) -> dict[str, Any]:
+    """What came of some of the episodes: of one trial, or with one value of a draw."""
     interval = list(wilson_interval(successes, episodes))
     return {"episodes": episodes, "success_rate": successes / episodes, "success_interval": interval}
 

@@ -307,7 +307,7 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
 
 
 def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
-    """Name of a table -> the table: runs, conditions, published, comparisons, rooms and outcomes."""
+    """Name of a table -> the table: runs, conditions, published, comparisons, rooms, outcomes and results by draws."""
     conditions, sections = analysis.experiment.conditions, analysis.sections
     rows = {
         "runs": [_run(condition, run) for condition in conditions for run in condition.runs],
@@ -316,6 +316,7 @@ def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
         "comparisons": [one for section in sections for one in section.comparisons],
         "rooms": [one for section in sections for one in section.rooms],
         "outcomes": [row for condition in conditions for row in _outcomes(condition)],
+        "results_by": [row for condition in conditions for row in _results_by(condition)],
     }
     return {name: pd.DataFrame(some, dtype=object) for name, some in rows.items()}
 
@@ -376,6 +377,24 @@ def _condition(summary: Summary) -> dict[str, Any]:
         ),
         "too_short": "; ".join(summary.short),
     }
+
+
+def _results_by(condition: Condition) -> list[dict[str, Any]]:
+    """Success in the test episodes with each value of a draw by which results are told apart, by run."""
+    return [
+        {
+            "condition": condition.entry.name,
+            "id": run.id,
+            "seed": run.seed,
+            "draw": draw,
+            "value": value,
+            "test_episodes": part.episodes,
+            "success_rate": part.success_rate,
+        }
+        for run in condition.done
+        for draw, values in (run.figures.results_by if run.figures is not None else {}).items()
+        for value, part in values.items()
+    ]
 
 
 def _outcomes(condition: Condition) -> list[dict[str, Any]]:

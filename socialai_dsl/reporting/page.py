@@ -31,7 +31,7 @@ from socialai_dsl.reporting.analysis import (
 )
 from socialai_dsl.reporting.collect import RunRecord
 from socialai_dsl.reporting.published import MARGIN
-from socialai_dsl.reporting.records import ResultRecord
+from socialai_dsl.reporting.records import Figures, PartFigures, ResultRecord
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
@@ -414,10 +414,29 @@ def _endings(drawing: str, summary: Summary) -> dict[str, Any]:
         "endings": [
             {"ended by": _ending(summary, name), "of the episodes": spread(outcomes[name])} for name in ended
         ],
+        "results_by": _results_by(done),
         "rules": [
             {f"rule{more}": name, "firings per episode": spread(rules[name])} for name in fired[:_RULES_SHOWN]
         ],
     }
+
+
+def _results_by(done: Sequence[Figures]) -> Rows:
+    """Success with each value of the draws by which results are told apart."""
+    found: dict[tuple[str, str], list[PartFigures]] = {}
+    for figures in done:
+        for draw, values in figures.results_by.items():
+            for value, part in values.items():
+                found.setdefault((draw, value), []).append(part)
+    return [
+        {
+            "draw": draw,
+            "value": value,
+            "success": spread([part.success_rate for part in parts]),
+            "test episodes": " or ".join(str(n) for n in sorted({part.episodes for part in parts})),
+        }
+        for (draw, value), parts in found.items()
+    ]
 
 
 def _ending(summary: Summary, name: str) -> str:

@@ -29,8 +29,8 @@ class ProbeFigures(Record):
     chance: float | None = Field(None, ge=0, le=1)
 
 
-class TrialFigures(Record):
-    """What came of the episodes that were the same trial of their sessions."""
+class PartFigures(Record):
+    """What came of some of the episodes: of the same trial of their sessions, or with one value of a draw."""
 
     episodes: int = Field(ge=1)
     success_rate: float = Field(ge=0, le=1)
@@ -42,6 +42,7 @@ class Figures(Record):
     Attributes:
         actions: how they came about, in a phrase.
         trials: in order, where players remembered several episodes in a row.
+        results_by: draw -> value -> what came of the episodes with it.
         replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
             `cost` in US dollars, None where prices are not known.
     """
@@ -61,7 +62,8 @@ class Figures(Record):
     tokens_estimated: bool = False
     cost: float | None = Field(None, ge=0)
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
-    trials: list[TrialFigures] = Field(default_factory=list)
+    trials: list[PartFigures] = Field(default_factory=list)
+    results_by: dict[str, dict[str, PartFigures]] = Field(default_factory=dict)
 
 
 class ResultRecord(Record):

@@ -84,10 +84,10 @@ LanguageTag = Annotated[str, StringConstraints(pattern=LANGUAGE_TAG)]
 
 NOT_BLANK: Final = r"\S"
 _Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=4000)]
-_Instruction = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
+_InLanguages = dict[LanguageTag, Annotated[_Told, as_written(_Told | float | bool | _Null), Holds("told")]]
 Instructions = Annotated[
-    Annotated[_Instruction, Tag("text")]
-    | Annotated[Annotated[dict[LanguageTag, _Instruction], Field(min_length=1)], Tag("mapping")],
+    Annotated[_Told, as_written(_Told | float | bool), Holds("told"), Tag("text")]
+    | Annotated[Annotated[_InLanguages, Field(min_length=1)], Tag("mapping")],
     Discriminator(lambda value: "mapping" if isinstance(value, dict) else "text"),
     Holds("prose"),
 ]
@@ -628,6 +628,17 @@ Names = Annotated[
 """One member or group of the cast, or a list of them."""
 
 
+LetNames = Annotated[
+    ListOf[LetName],
+    Field(min_length=1),
+    BeforeValidator(
+        _one_or_many,
+        json_schema_input_type=LetName | Annotated[tuple[LetName, ...], Field(min_length=1)],
+    ),
+]
+"""One `let`, or a list of them."""
+
+
 class OnlyThrough(Model):
     """A draw that only these members reveal."""
 
@@ -903,6 +914,11 @@ class Scenario(Model):
         default_factory=dict,
         max_length=16,
         description="name: a strategy that lacks the skill, as a frame for the agent; `SCENARIO+name` plays it",
+    )
+    results_by: LetNames = Field(
+        (),
+        description="one or several `let`: results are also told for each of their values; playing never reads it",
+        examples=["condition"],
     )
     published: ListOf[Published] = Field(
         (), description="figures of studies with people, which the data sheet shows; playing never reads them"

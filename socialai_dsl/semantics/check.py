@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from operator import itemgetter
 from typing import Final, get_args
@@ -115,6 +115,27 @@ def properties(
                 yield written.unasked(found)
 
 
+def _told_apart(resolver: Resolver, drawn: Iterable[Drawn]) -> Iterator[str]:
+    """The draws by whose values results are told apart."""
+    lets = [item.path for item in drawn if item.path.startswith("let.")]
+    for path, name in resolver.findings.each(("results_by",), resolver.symbols.scenario.results_by):
+        with surviving():
+            yield _let(resolver, path, name, lets).removeprefix("let.")
+
+
+def _let(resolver: Resolver, path: DataPath, word: str, lets: Collection[str]) -> str:
+    """The register of a draw that is named at a path."""
+    findings = resolver.findings
+    if f"let.{word}" not in lets:
+        if word in resolver.symbols.scenario.let and findings.bag.has_errors:
+            raise FailedError  # its value means nothing, which has been reported
+        near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
+        message = f"`{word}` is not drawn in `let`"
+        raise findings.no_such(word, message, findings.at(path, width=len(word)), suggestion=near)
+    resolver.used.add(("let", word))
+    return f"let.{word}"
+
+
 class _Entry:
     """One entry, and where it stands."""
 
@@ -156,7 +177,9 @@ class _Entry:
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (
-                    list(lets) if entry.draw is None else [self._let((*self._path, "draw"), entry.draw, lets)]
+                    list(lets)
+                    if entry.draw is None
+                    else [_let(self._resolver, (*self._path, "draw"), entry.draw, lets)]
                 )
                 found = tuple((path, values) for path in tried if len(set(values := _values(lets[path]))) > 1)
                 if entry.draw is not None and not found:
@@ -165,7 +188,7 @@ class _Entry:
             case "only_through":
                 assert entry.only_through is not None, "internal: there is a value for this key"
                 word, by = entry.only_through.draw, entry.only_through.by
-                path = self._let((*place, "draw"), word, lets)
+                path = _let(self._resolver, (*place, "draw"), word, lets)
                 members = self._members((*place, "by"), by)
                 if len(set(values := _values(lets[path]))) < 2:
                     raise self._not_a_pick((*place, "draw"), word)
@@ -228,17 +251,6 @@ class _Entry:
                 "S201", f"there is no rival `{name}`", self._findings.at(path, width=len(name)), **advice
             )
         return name
-
-    def _let(self, path: DataPath, word: str, lets: dict[str, Drawn]) -> str:
-        if f"let.{word}" not in lets:
-            if word in self._resolver.symbols.scenario.let and self._findings.bag.has_errors:
-                raise FailedError  # its value means nothing, which has been reported
-            near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
-            message = f"`{word}` is not drawn in `let`"
-            span = self._findings.at(path, width=len(word))
-            raise self._findings.no_such(word, message, span, suggestion=near)
-        self._resolver.used.add(("let", word))
-        return f"let.{word}"
 
     def _not_a_pick(self, path: DataPath, word: str) -> Exception:
         message = f"`{word}` is no free choice of several values"
@@ -441,6 +453,7 @@ class _Run:
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
+        by = tuple(_told_apart(resolver, drawn))
         claimed = tuple(properties(resolver, outcomes, drawn, self._patches))
         asked = probes(resolver)
         tested = dialogues(resolver, outcomes)
@@ -503,6 +516,7 @@ class _Run:
             looks=tuple(rows.look_plans(resolver)) if scenario.looks else (),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
+            results_by=by,
             probes=asked,
             tests=tested,
             accepting=accepting,

@@ -598,6 +598,7 @@ class CheckedScenario:
     shows_carrying: bool = False
     looks: tuple[LookPlan, ...] = ()
     properties: tuple[PropertyPlan, ...] = ()
+    results_by: tuple[str, ...] = ()
     probes: tuple[ProbePlan, ...] = ()
     tests: tuple[DialoguePlan, ...] = ()
     accepting: tuple[tuple[int, str], ...] = ()

@@ -83,12 +83,15 @@ def _place(span: Span, own: str) -> Reply:
 
 def _claim(plan: PropertyPlan, found: Report, seed: int, own: str) -> Reply:
     """A claim, with the first room that speaks against it; what is done there, or who plays there."""
+    from socialai_dsl.analysis.scenario_report import lines_apart
+
     shown = None
     if found.against and found.verdict.value != "holds":
         variant = f"+{plan.rival}" if plan.rival else ""
         acts = list(found.acts) or None
         shown = {"room": {"seed": seed, "index": found.against[0]}, "variant": variant, "acts": acts}
-    verdict = {"claim": plan.text, "verdict": found.verdict.value, "said": found.said, "shown": shown}
+    said = "; ".join([found.said, *lines_apart(plan, found)])
+    verdict = {"claim": plan.text, "verdict": found.verdict.value, "said": said, "shown": shown}
     return {**_place(plan.span, own), **verdict}
 
 
