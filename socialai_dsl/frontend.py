@@ -41,7 +41,10 @@ from socialai_dsl.diagnostics import (
 from socialai_dsl.loader.comments import comments_of
 from socialai_dsl.loader.reader import display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from socialai_dsl.schema.annotations import held_at
 from socialai_dsl.schema.curriculum import Curriculum
+from socialai_dsl.schema.files import model_of_file
+from socialai_dsl.schema.holds import TEXTS
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import DataPath, Source, Span, Style
@@ -245,21 +248,20 @@ def _repeated(first: Diagnostic, others: Sequence[Diagnostic]) -> str:
     return f"the same is in {' and in '.join(where)}" if where else "the same is in this line once more"
 
 
-_SPOKEN: Final = frozenset({"say", "hears", "ask", "answers", "templates", "nouns", "name"})
 _GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")
 """A comment whose text begins without a blank, as in `#1`."""
 
 
 def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
     """A warning for each text that is written without quotes and seems to go on behind a `#`."""
+    model = model_of_file(resolved.data) if isinstance(resolved.data, dict) else None
     for path, node in resolved.tree.walk():
         span, text = node.span, node.value
         if not isinstance(text, str) or span.style is not Style.PLAIN:
             continue
-        key = next((step for step in reversed(path) if isinstance(step, str)), "")
         comment = _GLUED.match(node.source.text, span.end)
-        spoken = key in _SPOKEN or "with" in path[-2:-1] or path[:2] == ("grammar", "slots")
-        if comment is None or not spoken:
+        held = held_at(model, path) if comment is not None and model is not None else None
+        if comment is None or held is None or held.kind not in TEXTS - {"state"}:
             continue
         place = span.value.shifted(comment.start(1) - span.start, len(comment[1]))
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
@@ -484,8 +486,7 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, te
     except ScenarioError as error:
         return CheckResult(name, None, None, tuple(DiagnosticBag(error.diagnostics)), error.sources, None)
     bag = DiagnosticBag()
-    if resolved.kind in ("scenario", "npc", "library"):
-        bag.extend(swallowed(resolved))
+    bag.extend(swallowed(resolved))
     if resolved.kind == "suite":
         suite = check_suite(resolved, bag)
         return _sifted(

@@ -3,7 +3,10 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
-_CONDITIONS: Final = ("hears", "when", "after", "chance", "once")
+from socialai_dsl.schema.annotations import keys_of
+from socialai_dsl.schema.scenario import DOES, FirstRule
+
+_CONDITIONS: Final = tuple(key for key in keys_of(FirstRule) if key not in (*DOES, "id"))
 
 
 def code(text: object) -> str:

@@ -33,7 +33,8 @@ from socialai_dsl.program import (
     place_of,
 )
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.schema.scenario import Model
+from socialai_dsl.schema.annotations import keys_of
+from socialai_dsl.schema.scenario import DOES, Model
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Const, Read, Readings, Term
 from socialai_dsl.semantics.words import ACTIVITIES
@@ -155,11 +156,6 @@ def _listed(names: Sequence[str]) -> str:
 
 
 # -- rules and their reasons ---------------------------------------------------------------------------------
-
-
-_ORDER: Final = ("hears", "until", "for", "when", "after", "chance", "once", "success", "failure", "do", "set",
-                 "reward", "cause", "say", "goto", "goto_now")  # fmt: skip
-"""In which order the keys of a rule are shown."""
 
 
 class Explainer:
@@ -433,7 +429,8 @@ class _Story:
         written = _written(model)
         if key:
             return f"{key}: {_flow(written[key])}" if key in written else ""
-        keys = [word for word in _ORDER if word in written]
+        asked = [key for key in keys_of(type(model)) if key not in (*DOES, "id", "state")]
+        keys = [key for key in (*asked, *DOES) if key in written]
         return ", ".join(f"{word}: {_flow(written[word])}" for word in keys)
 
 

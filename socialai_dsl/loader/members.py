@@ -10,10 +10,12 @@ from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.schema.annotations import keys_of, keys_that_hold
+from socialai_dsl.schema.suite import Value
 from socialai_dsl.source import Data, DataPath, Node
 from socialai_dsl.vocabulary import spelt
 
-NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")
+NODE_KEYS: Final = frozenset(keys_of(Value))
 """Keys of a value in a tree; every other key is a parameter below it."""
 
 MAX_LEAVES: Final = 512
@@ -386,7 +388,7 @@ def _check_parameters(
             name
             for leaf in below
             for node in leaf.nodes
-            for verb in ("set", "add")
+            for verb in keys_that_hold(Value, "patch")
             for path in _mapping(suite.tree.at(node).data, verb) or {}
             for name in (path.removeprefix("params."), "params" if path == "params" else path)
         }

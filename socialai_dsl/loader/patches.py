@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader.reader import MAX_PATCH_PATH
-from socialai_dsl.schema.annotations import sections_of
+from socialai_dsl.schema.annotations import keys_of, keys_that_hold, sections_of
 from socialai_dsl.schema.files import VariantFile
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
@@ -130,11 +130,11 @@ def _shown(path: str, end: int) -> str:
 # -- patches -------------------------------------------------------------------------------------------------
 
 
-VARIANT_KEYS: Final = tuple(VariantFile.model_fields)
+VARIANT_KEYS: Final = tuple(keys_of(VariantFile))
 
 PATCH_VERBS: Final = ("remove", "set", "add")
 
-_DESCRIPTION: Final = ("about", "notes", "skills")
+_DESCRIPTION: Final = keys_that_hold(VariantFile, "prose")
 
 _MAPPINGS, _LISTS = map(frozenset, sections_of(Scenario))
 _OF_SUITES = tuple(map(frozenset, sections_of(Suite)))
@@ -368,13 +368,14 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
         found.error("S105", "a variant needs `of`: what it is a variant of", root.key_span(), hint=hint)
     elif not isinstance(base.value, str):
         found.error("S104", f"`of` names a file, it is not {base.kind}", base.value_span())
-    for key in ("variant", "about", "notes"):
+    mappings, lists = sections_of(VariantFile)
+    for key in {*VARIANT_KEYS} - {"of", *mappings, *lists}:
         entry = root.entry(key)
         if entry is not None and not isinstance(entry.value, str):
             found.error("S104", f"`{key}` is a text, not {entry.kind}", entry.value_span())
-    for key in ("skills", "remove"):
+    for key in lists:
         _check_texts(root, key, found)
-    for key in ("set", "add"):
+    for key in mappings:
         section = root.entry(key)
         if section is not None and not isinstance(section.children, dict):
             _not_a_mapping(key, section, found)

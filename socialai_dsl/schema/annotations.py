@@ -21,7 +21,7 @@ from socialai_dsl.schema.experiment import (
     Transfer,
 )
 from socialai_dsl.schema.files import FILES, TestsFile
-from socialai_dsl.schema.holds import TEXTS, Holds, Kind, branches, said_of
+from socialai_dsl.schema.holds import TEXTS, Hides, Holds, Kind, branches, said_of
 from socialai_dsl.schema.scenario import (
     Belief,
     CastMember,
@@ -192,7 +192,7 @@ def _step(annotation: Any, step: str | int) -> Any:
 
 def holds_of(annotation: Any) -> Holds | None:
     """What a place with this annotation holds; None if nothing says so."""
-    said = said_of(annotation)
+    said = said_of(annotation, Holds)
     if said is not None:
         return said
     for part in branches(annotation):
@@ -244,6 +244,15 @@ def _patched(path: str) -> Any:
     steps = tuple(0 if step.startswith("[") else step for step in _STEP.findall(path))
     found = (annotation_at(model, steps) for model in (Scenario, Suite))
     return next((annotation for annotation in found if annotation is not Any), Any)
+
+
+def may_hide(model: type[BaseModel], path: DataPath) -> bool:
+    """Whether a mistake at a path may make other parts of the file look wrong."""
+    if model_at(model, path[:-1]) is None:
+        return True  # an entry of a mapping of names, or of a list
+    annotation = annotation_at(model, path)
+    said, held = said_of(annotation, Hides), holds_of(annotation)
+    return said.others if said is not None else held is None or not held.is_alone
 
 
 def keys_that_hold(model: type[BaseModel], *kinds: Kind) -> list[str]:
@@ -298,7 +307,7 @@ def sections_of(model: type[BaseModel]) -> tuple[list[str], list[str]]:
         ):
             mappings.append(field.alias or name)
         elif any(get_origin(part) in (tuple, list) for part in parts) and (
-            field.is_required() or not field.default
+            field.is_required() or not field.get_default(call_default_factory=True)
         ):
             lists.append(field.alias or name)
     return mappings, lists

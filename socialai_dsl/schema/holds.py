@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 Kind = Literal[
     # texts
@@ -43,6 +43,9 @@ TEXTS: frozenset[Kind] = frozenset({"text", "told", "prose", "state", "label", "
 """Kinds of which nothing but a text can stand there, whatever YAML takes a plain word for."""
 
 
+Said = TypeVar("Said")
+
+
 @dataclass(frozen=True)
 class Holds:
     """What a key holds.
@@ -58,6 +61,23 @@ class Holds:
     of: tuple[str, ...] = ()
     beside: tuple[type, ...] = ()
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether no other part of a file depends on what is written there."""
+        return self.kind in _ALONE
+
+
+_ALONE = frozenset[Kind](
+    {"prose", "told", "label", "new name", "activity", "spelt", "word", "number", "truth"}
+)
+
+
+@dataclass(frozen=True)
+class Hides:
+    """Whether a mistake in a value may make other parts look wrong, where its kind says something else."""
+
+    others: bool
+
 
 def branches(annotation: Any) -> Iterator[Any]:
     """The branches of a union, without annotations around them."""
@@ -71,12 +91,12 @@ def branches(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def said_of(annotation: Any) -> Holds | None:
-    """What a type says that it holds: the outermost word, of a union the first; None if it says nothing."""
+def said_of(annotation: Any, word: type[Said]) -> Said | None:
+    """What a type says in a word: the outermost, of a union the first; None if it says nothing."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        own = [word for word in annotation.__metadata__ if isinstance(word, Holds)]
-        return own[-1] if own else said_of(arguments[0])
+        own = [said for said in annotation.__metadata__ if isinstance(said, word)]
+        return own[-1] if own else said_of(arguments[0], word)
     if origin in (Union, UnionType):
-        return next(filter(None, map(said_of, arguments)), None)
-    return said_of(arguments[0]) if origin in (tuple, list) else None
+        return next((said for part in arguments if (said := said_of(part, word)) is not None), None)
+    return said_of(arguments[0], word) if origin in (tuple, list) else None

@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic.config import JsonDict
 
-from socialai_dsl.schema.holds import Holds
+from socialai_dsl.schema.holds import Hides, Holds
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
@@ -176,8 +176,12 @@ Probability = Annotated[
 ]
 
 
+DOES: Final = ("do", "set", "reward", "cause", "say", "to", "goto", "goto_now")
+"""Keys of a rule or a step that say what it does, in this order whatever the order in the file."""
+
+
 class Effects(Model):
-    """What a rule or a step does, in this order whatever the order in the file: do, set, cause, say, goto."""
+    """What a rule or a step does, in the order of `DOES`."""
 
     set: dict[Target, Expression] = Field(
         default_factory=dict, description="registers of the frame's `let`", examples=[{"trust(speaker)": 5}]
@@ -198,7 +202,9 @@ class Rule(Effects):
     )
     addressed: bool | None = Field(None, description="of `hears`: only what is said to it, or only the rest")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
-    after: Expression | None = Field(None, description="holds from this turn in the state on")
+    after: Annotated[Expression | None, Hides(False)] = Field(
+        None, description="holds from this turn in the state on"
+    )
     chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
     once: bool = Field(False, description="once per episode and NPC")
 
@@ -298,13 +304,13 @@ class Look(Model):
     for_: Expression = Field(
         alias="for", description="a group: objects, or members of the cast", examples=["balls"]
     )
-    words: ListOf[Word] = Field(
+    words: Annotated[ListOf[Word], Hides(True)] = Field(
         min_length=2, max_length=8, description="its values", examples=[["small", "large"]]
     )
     start: Expressions = Field(
         ("random",), description="its value at first, or a list with one for each; default random"
     )
-    ordered: bool = Field(
+    ordered: Annotated[bool, Hides(True)] = Field(
         False, description="its values go from the least to the greatest: `a.size < b.size` compares them"
     )
 
@@ -346,7 +352,9 @@ class Role(Model):
     at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
-    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    facing: Annotated[Expression | None, Hides(False)] = Field(
+        None, description="a direction, random, or toward(x); default random"
+    )
     frame: FrameName | None = Field(None, description="the frame an NPC in this role follows")
 
 
@@ -386,12 +394,14 @@ class Character(Model):
     name: SpeakerName | None = Field(
         None, description="the speaker's name before its lines; default its key, capitalised"
     )
-    color: Expression | None = Field(None, description="default random")
+    color: Annotated[Expression | None, Hides(False)] = Field(None, description="default random")
     place: Place | None = Field(None, description="default anywhere")
     at: ListOf[Expression] | None = Field(
         None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
     )
-    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    facing: Annotated[Expression | None, Hides(False)] = Field(
+        None, description="a direction, random, or toward(x); default random"
+    )
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
     earshot: Earshot | None = Field(None, description="the reach of its voice")
     frame: FrameName | None = Field(None, description="the frame it follows; default none: it stays")
@@ -500,7 +510,7 @@ class ObjectGroup(Model):
     """An object, or with `count` (or a list in `at`) a group of them."""
 
     type: TypeName = Field(description="an object type of the prelude", examples=["door"])
-    count: int | None = Field(None, ge=1, le=16, description="the size of the group")
+    count: Annotated[int | None, Hides(True)] = Field(None, ge=1, le=16, description="the size of the group")
     place: Places | None = Field(None, description="where it is drawn; a list gives one each")
     at: (
         Annotated[
@@ -509,7 +519,9 @@ class ObjectGroup(Model):
         ]
         | None
     ) = Field(None, description="[x, y], or a list of them: a group")
-    color: Expressions | None = Field(None, description="a colour, `random`, `distinct`, or one each")
+    color: Annotated[Expressions | None, Hides(False)] = Field(
+        None, description="a colour, `random`, `distinct`, or one each"
+    )
     state: StateName | None = Field(None, description="initial status; default the type's")
     pressed: Expression | None = Field(None, description="whether it is pressed at first")
     opened: Expression | None = Field(None, description="whether it is opened at first")
@@ -517,7 +529,9 @@ class ObjectGroup(Model):
     tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
     dark: bool = Field(False, description="the agent sees no difference between its statuses")
-    carryable: bool = Field(False, description="it can be picked up, carried and given")
+    carryable: Annotated[bool, Hides(True)] = Field(
+        False, description="it can be picked up, carried and given"
+    )
     inside: Annotated[str, Holds("name", ("objects", "cast"))] | None = Field(
         None, description="the object it lies in, unseen until that is opened, or who carries it at first"
     )
@@ -600,7 +614,7 @@ class UtteranceGrammar(Model):
         description="in place of `nouns`, name: the values of <name>: words, things, members, `colors`, 1..6",
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
     )
-    to: SlotMark | None = Field(
+    to: Annotated[SlotMark | None, Hides(True)] = Field(
         None,
         description="the slot whose member of the cast is addressed by what is said",
         examples=["<whom>"],
@@ -653,20 +667,24 @@ class Property(Model):
 
     reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
     never: Expression | None = Field(None, description="a condition, or the name of an outcome")
-    within: int | None = Field(None, ge=1, le=10_000, description="steps of a shortest success")
-    oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
-    script: Literal["perceives"] | None = Field(
+    within: Annotated[int | None, Hides(True)] = Field(
+        None, ge=1, le=10_000, description="steps of a shortest success"
+    )
+    oracle: Annotated[Probability | None, Hides(True)] = Field(
+        None, description="share of rooms that the variant `oracle` solves"
+    )
+    script: Annotated[Literal["perceives"] | None, Hides(True)] = Field(
         None, description="the variant `oracle` acts on its perceptions alone"
     )
     rival: Annotated[Word, Holds("name", ("rivals",))] | None = Field(
         None, description="a strategy of `rivals`, which must not succeed too often"
     )
-    at_most: Probability | None = Field(
+    at_most: Annotated[Probability | None, Hides(True)] = Field(
         None, description="for `rival`: the share of rooms that it may solve at most"
     )
     needs: Names | None = Field(None, description="members without which an agent can only guess")
     only_through: OnlyThrough | None = Field(None, description="members whose cues alone may reveal a draw")
-    knowable: bool | None = Field(
+    knowable: Annotated[bool | None, Hides(True)] = Field(
         None,
         description="whether an agent can perceive in time the draws that its success depends on (tried by default)",
     )
@@ -768,7 +786,9 @@ class Outcome(Model):
         None, description="a condition that ends the episode well", examples=["agent.at(exit)"]
     )
     failure: Expression | None = Field(None, description="a condition that ends the episode badly")
-    reward: Expression = Field(100, description="per cent of the success reward; computed when it ends")
+    reward: Annotated[Expression, Hides(False)] = Field(
+        100, description="per cent of the success reward; computed when it ends"
+    )
     id: Word | None = Field(None, description="names the outcome in figures, `check` and patches")
 
 
@@ -861,7 +881,7 @@ class Scenario(Model):
     grammar: Annotated[
         UtteranceGrammar, as_written(UtteranceGrammar | Word), Holds("name", ("grammars",))
     ] = Field(description="the agent's utterances: written out, or the name of a shared grammar")
-    room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
+    room: Annotated[Room, Hides(False)] = Field(description="the walled room", examples=[{"size": "5..8"}])
     order: ListOf[Annotated[Word, Holds("name", ("objects", "cast"))]] = Field(
         (), description="placement order"
     )
@@ -899,10 +919,12 @@ class Scenario(Model):
     rules: ListOf[WorldRule] = Field(
         (), description="rules about the world, read once a step; each that holds takes effect"
     )
-    outcome: ListOf[Outcome] = Field(
+    outcome: Annotated[ListOf[Outcome], Hides(False)] = Field(
         min_length=1, description="read top to bottom after every step; the first that holds ends the episode"
     )
-    reward: Reward = Field(Reward(), description="the reward of a success and of each step")
+    reward: Annotated[Reward, Hides(False)] = Field(
+        Reward(), description="the reward of a success and of each step"
+    )
     observe: Observe = Field(Observe(), description="the agent's perception")
     require: ListOf[Expression] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"
@@ -920,7 +942,7 @@ class Scenario(Model):
         description="one or several `let`: results are also told for each of their values; playing never reads it",
         examples=["condition"],
     )
-    published: ListOf[Published] = Field(
+    published: Annotated[ListOf[Published], Hides(False)] = Field(
         (), description="figures of studies with people, which the data sheet shows; playing never reads them"
     )
     probes: dict[Word, Probe] = Field(

@@ -16,9 +16,11 @@ from socialai_dsl.schema.annotations import (
     CALLED,
     annotation_at,
     expectation,
+    held_at,
     home_of,
     keys_of,
     literals,
+    may_hide,
     model_at,
 )
 from socialai_dsl.schema.holds import branches
@@ -36,7 +38,7 @@ from socialai_dsl.schema.scenario import (
 )
 from socialai_dsl.source import Data, DataPath, Node, Span, TextEdit
 
-_KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
+_KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in keys_of(model)}
 """Keys of rules, which are mostly written inside { }."""
 
 
@@ -366,7 +368,7 @@ def model_of(
             missing = [key for key in _STAND_INS if key not in data]
             repaired.lost += [(key,) for key in missing]
             made = _tried(model, data | {key: _STAND_INS[key] for key in missing})
-    lost = tuple(path for path in repaired.lost if str(path[-1]) not in _INDIFFERENT)
+    lost = tuple(path for path in repaired.lost if may_hide(model, path))
     return ShapedFile(made, repaired.tree, lost)
 
 
@@ -390,12 +392,6 @@ _STAND_INS: Final[dict[str, Data]] = {
     "outcome": [{"success": "t == 1"}],
 }
 """What stands for the parts that every scenario needs where a file lacks them, so that its other mistakes are found."""
-
-_INDIFFERENT: Final = frozenset(
-    "scenario outcome room about notes skills instructions training_frames horizon earshot view kind kind_code audible "
-    "color facing reward id after chance once npcs image names own_voice canvas actions do published".split()
-)
-"""Keys whose loss makes nothing else in the file wrong."""
 
 PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
 """A parameter that is a whole value; known ones of scenarios have been put in before."""
@@ -627,10 +623,11 @@ class _Report:
 
     def _cure(self, finding: _Finding, expected: str) -> cures.Hint:
         """What to write in place of a value of a wrong kind."""
-        key, value, path = finding.key, finding.value, finding.path
+        value, path = finding.value, finding.path
         if isinstance(value, list) and len(value) == 2 and all(type(item) is int for item in value):
             interval = f"{value[0]}..{value[1]}"
-            if key in _RANGES:
+            held = held_at(self._model, path)
+            if held is not None and held.kind == "interval":
                 return self._instead(path, interval)
             return self._instead(path, f"pick({interval})", "which draws one of them")
         if isinstance(value, list) and expected == "an expression":
@@ -724,7 +721,6 @@ def _length(finding: _Finding) -> str:
     return f"`{key}` is empty"
 
 
-_RANGES: Final = ("size", "width", "height", "range")
 _UNIT: Final = re.compile(r"\s*(\d+(?:\.\d+)?)\s*([a-z]+|%)\s*")
 """A number with what it counts."""
 

@@ -9,7 +9,8 @@ from typing import Any, cast
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
+from socialai_dsl.schema.annotations import keys_of
+from socialai_dsl.schema.scenario import DOES, Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import abilities, addressing, groups, rows, texts, those
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.nesting import NestedPlanner
@@ -533,10 +534,6 @@ class _Planner:
 # -- what belongs to nobody's frame: rules of the world ------------------------------------------------------
 
 
-_DOES = ("cause", "set", "reward")
-"""Keys of a rule of the world that say what it does."""
-
-
 def rules(resolver: Resolver) -> Iterator[RulePlan]:
     """The rules of the world, in the order written."""
     for i, rule in enumerate(resolver.symbols.scenario.rules):
@@ -547,7 +544,9 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     name = f"rules[{rule.id}]" if rule.id else dotted(path)
     span = resolver.findings.places.value_span(path)
     # One of them that was written wrongly, which has been reported, still stands in the file.
-    written = any(resolver.findings.places.value_span((*path, key)) != span for key in _DOES)
+    written = any(
+        resolver.findings.places.value_span((*path, key)) != span for key in keys_of(WorldRule) if key in DOES
+    )
     if not (rule.cause or rule.set or rule.reward or written):
         resolver.findings.error(
             "S105", "a rule of the world needs `cause`, `set` or `reward`: what it does", span

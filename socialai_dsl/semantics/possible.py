@@ -13,6 +13,7 @@ from typing import Final
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar.ast import Not, every, unparse
+from socialai_dsl.schema.annotations import keys_of
 from socialai_dsl.schema.scenario import Frame, Scenario, State, Step, UtteranceGrammar
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.facts import SaidLater, TermFacts
@@ -242,8 +243,8 @@ def _check_steps(frame: Frame, path: DataPath, findings: Findings) -> None:
     _check_order(frame.steps or (), (*path, "steps"), findings)
 
 
-_OF_AN_ENTRY = ("do", "for", "state", "set", "cause", "say")
-_OF_NESTED_STEPS = ("repeat", "while")
+_OF_NESTED_STEPS: Final = frozenset({"repeat", "while"})
+_OF_AN_ENTRY: Final = frozenset(keys_of(Step)) - _OF_NESTED_STEPS - {"steps", "when", "until"}
 
 
 def _until(findings: Findings, path: DataPath) -> cures.Hint:
@@ -268,7 +269,7 @@ def _check_order(steps: Sequence[Step], path: DataPath, findings: Findings) -> N
         nested = step.steps is not None
         written = findings.part(place)
         keys = written if isinstance(written, dict) else {}
-        for key in keys.keys() & {*(_OF_AN_ENTRY if nested else _OF_NESTED_STEPS)}:
+        for key in keys.keys() & (_OF_AN_ENTRY if nested else _OF_NESTED_STEPS):
             span = findings.places.key_span((*place, key))
             message, hint = f"`{key}` belongs to an entry, not to nested `steps`", None
             if not nested:

@@ -14,6 +14,7 @@ from socialai_dsl import cures
 from socialai_dsl.diagnostics import Advice, DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text, rebuilt, unparse
+from socialai_dsl.schema.annotations import held_at
 from socialai_dsl.schema.scenario import CastMember, Expression, Frame, Scenario
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
@@ -47,10 +48,6 @@ V = TypeVar("V")
 
 KEY: Final = "(key)"
 """The last step of the path of an expression that is the key itself: `trust(speaker)` in `set`."""
-
-_NO_TEXTS = frozenset({"cause", "do", "place"})
-"""Keys whose values have no texts in them."""
-
 
 _BREAK: Final = re.compile(r"[\t\n\r]")
 """What ends a line, or moves what follows."""
@@ -190,7 +187,8 @@ class Findings:
     def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
         code = "S212" if problem.code == "S004" else problem.code
         hint: cures.Hint = problem.hint
-        if problem.words and not _NO_TEXTS & {*path}:
+        held = held_at(Scenario, path)
+        if problem.words and (held is None or held.kind not in ("activity", "effect", "place")):
             hint = f"{hint}; a text is quoted: {as_text(problem.words, self.part(path))}"
         if problem.instead is not None:
             start, end, text = problem.instead

@@ -148,3 +148,10 @@ def test_frames() -> None:
 def test_a_page_shows_what_studies_with_people_report() -> None:
     text = page("classics/helper_hinderer", socialai_dsl.load("classics/helper_hinderer"), None)
     assert "| infants of 10 months | reached for the helper | 88% | 16 | Hamlin, Wynn & Bloom 2007 |" in text
+
+
+def test_whom_a_rule_listens_to_is_a_condition() -> None:
+    assert (
+        rule({"say": "Hi", "addressed": True, "hears": "Ann"})
+        == "`hears: Ann`, `addressed: true` → `say: Hi`"
+    )

@@ -346,3 +346,14 @@ def test_what_is_heard_with_values_in_it_is_told_before_what_else_must_hold(tiny
     assert reason(play.step(), "You there")["why"] == "hears: Say <word>: nothing was heard"
     assert reason(play.step(None, "Say bye"), "You there")["why"] == 'hears: Say <word>: heard "Say bye"'
     assert "next_to(speaker) is false" in reason(play.step(None, "Say hello"), "You there")["why"]
+
+
+def test_every_key_of_a_rule_that_is_written_is_shown(tiny: Folder) -> None:
+    """Conditions first, then what it does, in the order in which it is done."""
+    rule = (
+        "{to: agent, say: Hello., addressed: false, hears: any, when: self.x == 9, once: true, chance: 0.5}"
+    )
+    play = tiny(GUIDE.replace("{hears: Say bye, after: 3, say: Bye.}", rule)).step(None, "Say hello")
+    assert reason(play, "self.x")["words"] == (
+        "hears: any, addressed: false, when: self.x == 9, chance: 0.5, once: true, say: Hello., to: agent"
+    )

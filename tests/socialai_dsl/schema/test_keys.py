@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -19,6 +20,8 @@ from socialai_dsl.schema.annotations import (
     fields_of,
     holds_of,
     keys_of,
+    keys_that_hold,
+    may_hide,
     models,
     sections_of,
 )
@@ -35,8 +38,15 @@ from socialai_dsl.schema.files import (
 from socialai_dsl.schema.holds import TEXTS, branches
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import (
+    DOES,
     CastGroup,
+    Effects,
+    FirstRule,
+    Observe,
+    Room,
     Scenario,
+    Step,
+    WorldRule,
     WrittenCast,
 )
 from socialai_dsl.schema.suite import Suite
@@ -201,7 +211,75 @@ def test_values_are_offered_where_a_place_takes_an_expression(
     assert not others & offered
 
 
-def test_keys_whose_loss_is_indifferent_are_keys() -> None:
-    known = {key for model in CALLED for key in keys_of(model)}
-    assert known >= shape._INDIFFERENT
+@pytest.mark.parametrize(
+    "file",
+    [
+        BARE + "instructions: Take #1\n",
+        BARE + "tests: {t: {play: [\n{do: Take #1\n}]}}\n",
+        BARE + "published: [{share: 0.5, n: 9, who: a, did: b,\nsource: Study #1\n}]\n",
+        "suite: s\nmembers: [bare.yaml]\ngrammar:\n  templates: [Hello <a>]\n  slots:\n    a: Take #1\n",
+        "library: grammars\ngrammars:\n  g:\n    templates: [Hello <a>]\n    slots:\n      a: Take #1\n",
+    ],
+)
+def test_a_text_that_a_comment_cuts_off_is_found_in_every_file(tmp_path: Path, file: str) -> None:
+    (tmp_path / "bare.yaml").write_text(BARE, encoding="utf-8")
+    (tmp_path / "cut.yaml").write_text(file, encoding="utf-8")
+    assert [d.code for d in check(tmp_path / "cut.yaml").diagnostics].count("W009") == 1
+
+
+@pytest.mark.parametrize("key", ["place", "do", "cause"])
+def test_a_text_is_proposed_under_a_name_of_the_author(tmp_path: Path, key: str) -> None:
+    """Such as `let: {place: ...}`, which is no place."""
+    (tmp_path / "bare.yaml").write_text(f"{BARE}let: {{{key}: Hello out there}}\n", encoding="utf-8")
+    (found,) = check(tmp_path / "bare.yaml").diagnostics
+    assert "a text is quoted" in str(found.hint)
+
+
+def kept_alone() -> Iterator[DataPath]:
+    """Keys on which nothing else in a scenario depends, and that take no mapping."""
+    for path, model in (((), Scenario), (("observe",), Observe), (("room",), Room)):
+        for key in keys_that_hold(model, "word", "number", "truth"):
+            if not may_hide(Scenario, (*path, key)):
+                yield (*path, key)
+
+
+@pytest.mark.parametrize("path", [*kept_alone()], ids=".".join)
+def test_a_mistake_in_a_value_that_stands_alone_hides_no_other(tmp_path: Path, path: DataPath) -> None:
+    written: Any = {"any": "thing"}
+    for step in reversed(path):
+        written = {step: written}
+    room = {"size": 6} | written.pop("room", {})
+    text = BARE.replace("room: {size: 6}", f"room: {json.dumps(room)}").replace(
+        "t == 9", "nobody.sees(agent)"
+    )
+    lines = [f"{key}: {json.dumps(value)}\n" for key, value in written.items()]
+    (tmp_path / "bare.yaml").write_text(text + "".join(lines), encoding="utf-8")
+    found = check(tmp_path / "bare.yaml").diagnostics
+    assert [d.code for d in found if "nobody" in d.message] == ["S201"]
+    assert {d.code for d in found} - {"S201"}
+
+
+def test_a_key_of_an_entry_is_refused_beside_nested_steps(tmp_path: Path) -> None:
+    for key in {*keys_of(Step)} - {"steps", "repeat", "while", "when", "until"}:
+        frame = f"frames: {{f: {{steps: [{{steps: [{{do: stay, for: 1}}], {key}: 1}}]}}}}\n"
+        text = BARE.replace("agent: {}", "agent: {}, ann: {frame: f}") + frame
+        (tmp_path / "bare.yaml").write_text(text, encoding="utf-8")
+        assert {d.code for d in check(tmp_path / "bare.yaml").diagnostics} & {"S104", "S107"}, key
+
+
+def test_every_word_that_authors_write_for_a_key_means_a_key() -> None:
+    assert {*shape._MEANT.values()} <= {key for model in models() for key in keys_of(model)}
+
+
+def test_what_stands_for_missing_parts_is_what_every_scenario_needs() -> None:
+    needed = {field.alias or name for name, field in Scenario.model_fields.items() if field.is_required()}
+    assert {*shape._STAND_INS} == needed
+
+
+def test_what_a_rule_does_are_keys_of_rules() -> None:
+    assert {*DOES} <= {key for model in (FirstRule, WorldRule, Step) for key in keys_of(model)}
+    assert {*keys_of(Effects)} <= {*DOES}
+
+
+def test_keys_of_groups() -> None:
     assert {*scenarios._ONE_EACH} == set(CastGroup.__annotations__) - {"count"}
