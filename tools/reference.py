@@ -14,6 +14,7 @@ from socialai_dsl.cli.main import run_alone
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
 
+    from socialai_dsl.schema.holds import Holds
     from socialai_dsl.semantics.signatures import Signature
 
 SUMMARY: Final = "print every key and word of the language as a page of Markdown"
@@ -53,38 +54,35 @@ def reference_page() -> str:
 
 
 def _keys() -> Iterator[str]:
-    from socialai_dsl.schema.annotations import CALLED
+    from socialai_dsl.schema.annotations import CALLED, keys_of
 
     yield "## Keys\n"
     for model, called in CALLED.items():
         yield f"### {_heading(called)}\n"
         yield _one_line(model.__doc__ or "") + "\n"
         yield "| key | value | default | meaning |\n|---|---|---|---|"
-        for name, field in _fields(model):
-            value = _AS_WRITTEN.get((called, name)) or _value(field.annotation, field)
-            meaning = _cell(field.description or "")
-            yield f"| `{field.alias or name}` | {value} | {_default(field)} | {meaning} |"
-        yield from _READ_BEFORE.get(called, ())
+        yield from (_row(model, key) for key in keys_of(model))
+        yield from _read_before(model)
         yield ""
 
 
-_AS_WRITTEN: Final = {
-    ("a member of the cast", "one_of"): "a file, or a list",
-    ("an npc file", "one_of"): "a file, or a list",
-    ("a scenario", "grammar"): "[a grammar](#grammar), or the name of [a shared one](#shared-grammars)",
-}
-"""What authors write where the models see something else."""
+def _read_before(model: type) -> Iterator[str]:
+    """The keys that authors write and that are gone when the model is made."""
+    from socialai_dsl.schema.annotations import CALLED, keys_of
 
-_EXTENDS: Final = "| `extends` | a file |  | the file it builds on; its own keys win |"
-_READ_BEFORE: Final = {
-    "a scenario": (_EXTENDS,),
-    "an npc file": (_EXTENDS,),
-    "a member of the cast": (
-        "| `count` | a whole number, 1 to 16 |  | makes a group; `name`, `color`, `place`, `facing`, `at` may then be "
-        "lists |",
-    ),
-}
-"""Keys that are gone when the models see a file."""
+    written_for: list[type] = model.__subclasses__()
+    for written in written_for:
+        for key in keys_of(written) if written not in CALLED else ():
+            if key not in keys_of(model):
+                yield _row(written, key).replace("| required |", "|  |")
+
+
+def _row(model: type, key: str) -> str:
+    from socialai_dsl.schema.annotations import fields_of
+
+    field = next(field for name, field in _fields(model) if key in (field.alias, name))
+    cells = (f"`{key}`", _value(fields_of(model)[key]), _default(field), _cell(field.description or ""))
+    return f"| {' | '.join(cells)} |"
 
 
 def _fields(model: type) -> list[tuple[str, "FieldInfo"]]:
@@ -119,33 +117,62 @@ def _default(field: "FieldInfo") -> str:
     return f"`[{', '.join(default)}]`" if isinstance(default, tuple) else f"`{default}`"
 
 
-def _value(annotation: Any, field: "FieldInfo | None" = None) -> str:
-    """What may be written, in words."""
+def _value(annotation: Any, around: Sequence[Any] = ()) -> str:
+    """What may be written, in words; `around` is what annotations around it say."""
     from typing import Annotated, Literal
 
     from socialai_dsl.schema.annotations import CALLED
+    from socialai_dsl.schema.holds import Holds
 
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _value(arguments[0])
+        return _value(arguments[0], (*annotation.__metadata__, *around))
+    held = next((word for word in reversed(around) if isinstance(word, Holds)), None)
+    if origin in (list, tuple):
+        item = _value(arguments[0], [held])
+        return f"{item}, or a list" if _one_will_do(around) else f"a list, each {item}"
     if annotation in CALLED:
-        return f"[{CALLED[annotation]}](#{_anchor(CALLED[annotation])})"
-    if annotation in _SCALARS:
-        return _SCALARS[annotation] + _bounds(field)
+        model = f"[{CALLED[annotation]}](#{_anchor(CALLED[annotation])})"
+        named = _named(held)
+        return model if not named else named if held and held.kind == "file" else f"{model}, or {named}"
     if origin is Literal:
         words = [f"`{word}`" for word in arguments]
         return " or ".join(words) if len(words) < 3 else "one of " + ", ".join(words)
     if origin is dict:
         return f"names, each with {_value(arguments[1])}"
-    if origin in (list, tuple):
-        item = _value(arguments[0])
-        return f"{item}, or a list" if _one_will_do(field) else f"a list, each {item}"
-    branches = [part for part in arguments if part is not NoneType]
-    if {int, bool, str} <= set(map(_plain, branches)):
-        rest = [part for part in branches if _plain(part) not in (int, bool, str, float)]
-        scalars = "a value" if float in map(_plain, branches) else "an expression"
-        return " or ".join([scalars, *map(_value, rest)])
-    return " or ".join(dict.fromkeys(_value(part, field) for part in branches))
+    parts = [part for part in arguments if part is not NoneType]
+    scalars = {part for part in parts or [annotation] if part in _SCALARS}
+    if named := _named(held) if scalars or not parts else "":
+        others = [_value(part) for part in parts if part not in _SCALARS]
+        return " or ".join([named, *others])
+    if {int, bool, str} <= scalars:
+        value = "a value" if float in scalars else "an expression"
+        return " or ".join([value, *(_value(part) for part in parts if part not in scalars)])
+    if annotation in _SCALARS:
+        return _SCALARS[annotation] + _bounds(around)
+    return " or ".join(dict.fromkeys(_value(part, around) for part in parts))
+
+
+def _named(held: "Holds | None") -> str:
+    """What is held, if that says more than the kind of the value."""
+    if held is None or held.kind != "name":
+        return _HELD.get(held.kind, "") if held is not None else ""
+    if held.of == ("grammars",):
+        return "the name of [a shared one](#shared-grammars)"
+    if held.of == ("types",):
+        return "the name of [a type](#object-types)"
+    return f"the name of one of {' or '.join(f'`{section}`' for section in held.of)}"
+
+
+_HELD: Final = {
+    "activity": "[an activity](#activities)",
+    "effect": "[an effect](#effects)",
+    "place": "[a place](#places)",
+    "state": "the name of a state",
+    "new name": "a name",
+    "file": "a file",
+}
+"""Kinds of values in words, where these say more than that they are texts or expressions."""
 
 
 _SCALARS: Final = {
@@ -157,20 +184,19 @@ _SCALARS: Final = {
 }
 
 
-def _one_will_do(field: "FieldInfo | None") -> bool:
-    validators = [getattr(data, "func", None) for data in field.metadata] if field is not None else []
-    return any(getattr(function, "__name__", "") == "_one_or_many" for function in validators)
+def _one_will_do(around: Sequence[Any]) -> bool:
+    """Whether one item may be written in place of the list of it."""
+    from socialai_dsl.schema.holds import branches
+
+    forms = [form for word in around if (form := getattr(word, "json_schema_input_type", None)) is not None]
+    return any(
+        get_origin(part) not in (list, tuple) for form in forms for part in branches(form) if part in _SCALARS
+    )
 
 
-def _plain(part: Any) -> Any:
-    return part if isinstance(part, type) else str(part)
-
-
-def _bounds(field: "FieldInfo | None") -> str:
-    if field is None:
-        return ""
-    low = next((data.ge for data in field.metadata if hasattr(data, "ge")), None)
-    high = next((data.le for data in field.metadata if hasattr(data, "le")), None)
+def _bounds(around: Sequence[Any]) -> str:
+    low = next((data.ge for data in around if hasattr(data, "ge")), None)
+    high = next((data.le for data in around if hasattr(data, "le")), None)
     return f", {low} to {high}" if low is not None and high is not None else ""
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from socialai_dsl.schema.holds import Holds
 from socialai_dsl.schema.scenario import ListOf, Model, Probability, Prose, Word
 from socialai_dsl.schema.suite import Labels, MemberName
 
@@ -39,7 +40,9 @@ class Group(Model):
     without: dict[Word, Labels] = Field(
         default_factory=dict, description="parameter: value or values; leaves that do not have all of them"
     )
-    members: ListOf[MemberName] | None = Field(None, description="names of members, instead of leaves")
+    members: ListOf[Annotated[MemberName, Holds("label")]] | None = Field(
+        None, description="names of members, instead of leaves"
+    )
     weight: Annotated[
         Annotated[Weight, Tag("number")] | Annotated[Ramp, Tag("ramp")], Discriminator(_form)
     ] = Field(1.0, description="of the whole group, in proportion to the other groups of the phase")

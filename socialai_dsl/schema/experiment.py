@@ -117,7 +117,7 @@ class Settings(_RunOptions):
     scenario: MemberName | None = Field(
         None, description="a shipped name, or a path relative to this file; with variants and parameters"
     )
-    variants: ListOf[Annotated[Word, Holds("file")]] | None = Field(
+    variants: ListOf[Annotated[Word, Holds("spelt")]] | None = Field(
         None, description="variants applied to the scenario and to its tests"
     )
     agent: Annotated[str, StringConstraints(min_length=1, max_length=1000), Holds("spelt")] | None = Field(

@@ -457,7 +457,11 @@ class CastGroup(CastMember):
     The loader makes members `name[0]`, `name[1]`, ... of it, so that no scenario holds one.
     """
 
-    count: int = Field(ge=1, le=16, description="the size of the group")
+    count: int = Field(
+        ge=1,
+        le=16,
+        description="makes a group of this size; `name`, `color`, `place`, `facing`, `at` may then be lists",
+    )
     name: Annotated[SpeakerName | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
         None, description="what precedes its lines; a list gives one each"
     )

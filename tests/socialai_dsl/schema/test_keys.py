@@ -11,6 +11,7 @@ import pytest
 from pydantic import BaseModel
 
 from socialai_dsl.authoring.assist import complete
+from socialai_dsl.authoring.names import meant
 from socialai_dsl.checking import scenarios
 from socialai_dsl.frontend import check
 from socialai_dsl.loader.reader import read_document
@@ -43,6 +44,7 @@ from socialai_dsl.schema.scenario import (
     Effects,
     FirstRule,
     Observe,
+    Property,
     Room,
     Scenario,
     Step,
@@ -50,6 +52,7 @@ from socialai_dsl.schema.scenario import (
     WrittenCast,
 )
 from socialai_dsl.schema.suite import Suite
+from socialai_dsl.semantics.check import _WITH, KINDS
 from socialai_dsl.source import DataPath, Source
 
 WRITTEN_OTHERWISE = {CastGroup, WrittenCast, VariantFile, GrammarLibrary, ObjectLibrary, Hyper}
@@ -265,6 +268,27 @@ def test_a_key_of_an_entry_is_refused_beside_nested_steps(tmp_path: Path) -> Non
         text = BARE.replace("agent: {}", "agent: {}, ann: {frame: f}") + frame
         (tmp_path / "bare.yaml").write_text(text, encoding="utf-8")
         assert {d.code for d in check(tmp_path / "bare.yaml").diagnostics} & {"S104", "S107"}, key
+
+
+def test_what_a_claim_is_about_and_what_it_says_more_are_its_keys() -> None:
+    assert [*KINDS, *_WITH] == sorted(keys_of(Property), key=[*KINDS, *_WITH].index)
+
+
+def test_every_name_that_a_key_holds_is_looked_for_where_it_is_declared() -> None:
+    """In a section of a file, whose names editors offer."""
+    held = [(key, annotation) for model in models() for key, annotation in fields_of(model).items()]
+    for key, annotation in held:
+        for part in (
+            annotation,
+            *(get_args(one)[0] for one in branches(annotation) if get_origin(one) is dict),
+        ):
+            holds = holds_of(part)
+            if holds is not None and holds.kind == "name" and holds.of != ("slots",):
+                for section in holds.of:
+                    path = ("frames", "f", "x", key)
+                    assert [name.word for name in meant({section: {"mine": {}}}, path, holds, "")] == [
+                        "mine"
+                    ], key
 
 
 def test_every_word_that_authors_write_for_a_key_means_a_key() -> None:
