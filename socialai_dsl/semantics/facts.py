@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, Literal
+from typing import Final, Literal, assert_never
 
 from socialai_dsl.grammar.ast import children
 from socialai_dsl.semantics import terms
@@ -115,6 +115,20 @@ def _own(term: Term, items: Items) -> Iterator[Need]:
             | terms.InState()
         ):
             yield Need("step")
+        case (
+            Const()
+            | terms.Variable()
+            | terms.ReadEach()
+            | terms.Operation()
+            | terms.Compare()
+            | terms.Logic()
+            | terms.Not()
+            | terms.Select()
+            | terms.Quantification()
+        ):
+            pass  # they combine others
+        case _:
+            assert_never(term)
 
 
 def relation(term: terms.Test) -> Relation:
