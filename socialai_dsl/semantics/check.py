@@ -374,12 +374,8 @@ def _no_agent(scenario: Scenario, findings: Findings) -> None:
 
 
 def _without_consequences(findings: Findings, scenario: Scenario) -> Iterator[Diagnostic]:
-    """What is wrong with the grammar makes many a text impossible to say, and a name that means two things makes many
-    an expression senseless; that need not be said as well.
-    """
+    """A name that means two things makes many an expression senseless; that need not be said as well."""
     found, follow = findings.bag, set[str]()
-    if any(d.code == possible.GRAMMAR_CODE for d in found):
-        follow |= {"S401", "S402"}
     words = {word for slot in scenario.grammar.slots.values() for word in slot}
     # An unknown name that is a word of a slot: there, too, a member or thing of another name was meant.
     if entities.mean_two_things(scenario) or words & findings.unknown:
@@ -539,6 +535,8 @@ class _Run:
         """Whether it can be known what the agent can say; mistakes are reported."""
         if not possible.check_grammar(self._scenario.grammar, self._findings):
             return False
+        for parts in possible.unclear_templates(self._scenario.grammar):
+            self.resolver.utterances.add_unclear(AGENT, parts)
         slots = self._scenario.grammar.slots
         if len(self._symbols.slots) < len(slots):
             return False  # a slot that cannot be filled, which has been reported

@@ -40,9 +40,8 @@ ALIKE: Final = "case, blanks, a final mark and other forms of the same letters d
 _TOLD = 12
 """How many states of a circle are named."""
 
-GRAMMAR_CODE = "S104"
-"""The code of a template that cannot be filled."""
-
+_SLOT: Final = re.compile("<[^<>]*>|[<>]")
+"""What is filled in a template, or looks like it."""
 
 MOST_PAIRS: Final = 64 * 256
 """The most numbers a grammar can have for what is said: templates times fillings."""
@@ -60,13 +59,10 @@ def check_grammar(grammar: UtteranceGrammar, findings: Findings) -> bool:
     if not grammar.nouns and not grammar.slots and any("<noun>" in one for one in grammar.templates):
         findings.error("S105", "`grammar` needs a key `nouns`", span)
         return False
-    names = [*grammar.slots] or ["noun"] * bool(grammar.nouns)
+    names = _slots_of(grammar)
     for i, template in enumerate(grammar.templates):
         path: DataPath = ("grammar", "templates", i)
-        known = "|".join(map(re.escape, names))
-        blanked = re.sub(f"<({known})>", lambda found: " " * len(found.group()), template)
-        other = re.search(r"<[^<>]*>|[<>]", blanked)
-        twice = next((f"<{name}>" for name in names if template.count(f"<{name}>") > 1), "")
+        other, twice = _unfilled(template, names)
         if other or twice:
             offset = other.start() if other else template.rindex(twice)
             width = len(other.group() if other else twice)
@@ -75,9 +71,9 @@ def check_grammar(grammar: UtteranceGrammar, findings: Findings) -> bool:
                 filled = " and ".join(f"`<{name}>`" for name in names) or "nothing"
                 filled = "one `<noun>`" if grammar.nouns else filled
                 message = f"a template has {filled} to fill, and no `{other.group()}`"
-            near = did_you_mean(other.group()[1:-1], grammar.slots) if other else None
+            near = did_you_mean(other.group()[1:-1], names) if other else None
             suggestion = f"<{near}>" if near else None
-            findings.error(GRAMMAR_CODE, message, findings.at(path, offset, width), suggestion=suggestion)
+            findings.error("S104", message, findings.at(path, offset, width), suggestion=suggestion)
     for part, words in (("templates", grammar.templates), ("nouns", grammar.nouns)):
         check_alike(part, words, findings)
         for i, word in enumerate(words):
@@ -85,8 +81,30 @@ def check_grammar(grammar: UtteranceGrammar, findings: Findings) -> bool:
             findings.must_be_one_line(path, str(word))
             if part == "nouns" and (mark := re.search("[<>]", str(word))):
                 message = "what stands in a slot has no slots itself"
-                findings.error(GRAMMAR_CODE, message, findings.at(path, mark.start()))
+                findings.error("S104", message, findings.at(path, mark.start()))
     return True
+
+
+def _slots_of(grammar: UtteranceGrammar) -> list[str]:
+    return [*grammar.slots] or ["noun"] * bool(grammar.nouns)
+
+
+def _unfilled(template: str, names: Sequence[str]) -> tuple[re.Match[str] | None, str]:
+    """What of a template nothing fills, and what it has twice; None and "" if it is right."""
+    known = "|".join(map(re.escape, names))
+    blanked = re.sub(f"<({known})>", lambda found: " " * len(found.group()), template)
+    return _SLOT.search(blanked), next((f"<{name}>" for name in names if template.count(f"<{name}>") > 1), "")
+
+
+def unclear_templates(grammar: UtteranceGrammar) -> Iterator[list[str | None]]:
+    """Templates in which something was reported, or that are filled by what was: what is fixed of them, and None for
+    all else.
+    """
+    names, nouns_unclear = _slots_of(grammar), any(_SLOT.search(str(noun)) for noun in grammar.nouns)
+    for template in grammar.templates:
+        if any(_unfilled(template, names)) or (nouns_unclear and "<noun>" in template):
+            fixed = _SLOT.split(template)
+            yield [fixed[0], *(part for text in fixed[1:] for part in (None, text))]
 
 
 def check_alike(part: str, words: Iterable[object], findings: Findings) -> None:
@@ -112,7 +130,7 @@ def check_slots_of_grammar(sentences: Sentences, findings: Findings) -> bool:
         if not strange and not any(used[place] for used in sentences.used):
             span = findings.places.key_span(("grammar", "slots", slot.name))
             hint = "every slot is a choice of its own for the agent; leave out what it cannot say"
-            findings.error(GRAMMAR_CODE, f"no template has `{slot.place}`", span, hint=hint)
+            findings.error("S104", f"no template has `{slot.place}`", span, hint=hint)
     if (count := len(sentences.templates) * sentences.fillings) > MOST_PAIRS:
         sizes = " x ".join(map(str, sentences.radices))
         product_of = f"{len(sentences.templates)} x {sizes} = {count:,}"

@@ -101,9 +101,11 @@ class Utterances:
                 self._by_normal.setdefault(normal(text), []).append((len(self.npc_texts), text))
             self.npc_texts[text] = own[text] = None
 
-    def add_unclear(self, member: str | None, text: ast.Text | None) -> None:
-        """Make known that a member says a text in which something was reported that means nothing; None: any text."""
-        parts = text.parts if text is not None else (None,)
+    def add_unclear(self, member: str | None, parts: Iterable[object]) -> None:
+        """Make known that a member says a text in which something was reported that means nothing; None: anybody.
+
+        `parts`: what is fixed of it as texts; anything may stand in the place of others.
+        """
         written = "".join(re.escape(normal(part)) if isinstance(part, str) else ".*" for part in parts)
         self._unclear.append((member, re.compile(written.replace("\\ ", r"\s*"))))
 

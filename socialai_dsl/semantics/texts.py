@@ -273,7 +273,7 @@ def _report_unsayable(
 ) -> None:
     findings = resolver.findings
     said, word = unsayable[0]
-    if from_npcs and resolver.utterances.may_be_said(said):
+    if resolver.utterances.may_be_said(said, None if from_npcs else {"agent"}):
         raise FailedError
     if values and some:
         node, value = values[0]
@@ -318,7 +318,7 @@ def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
         return _line(resolver, path, text, scope)
     except FailedError:
         if scope.member != "agent":
-            resolver.utterances.add_unclear(scope.member, text)
+            resolver.utterances.add_unclear(scope.member, text.parts if text is not None else [None])
         raise
 
 
@@ -400,6 +400,8 @@ def _agents(resolver: Resolver, line: Line) -> Line:
     unsayable = [said for said in texts if normal(said) not in spelled]
     if unsayable:
         said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
+        if resolver.utterances.may_be_said(said, {"agent"}):
+            raise FailedError
         message = f'the agent cannot say "{said}" with this grammar'
         if len(unsayable) < len(texts) and any(_may_change(resolver, value) for value in values):
             hint = "then it says nothing; give the register a range, or the grammar the noun"
