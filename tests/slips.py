@@ -41,7 +41,10 @@ SLIPS = _slips()
 def write_mistakes(folder: Path) -> None:
     """Fill a folder with all files that have a mistake, and with those that they name."""
     shutil.copytree(
-        FOLDER, folder, ignore=shutil.ignore_patterns("*.out", "*.py", "*.slips", "found.txt"), dirs_exist_ok=True
+        FOLDER,
+        folder,
+        ignore=shutil.ignore_patterns("*.out", "*.py", "*.slips", "found.txt"),
+        dirs_exist_ok=True,
     )
     for name, text in SLIPS.items():
         (folder / f"{name}.yaml").write_text(text, encoding="utf-8")

@@ -11,7 +11,7 @@ from socialai_dsl.loader.reader import display_name
 from socialai_dsl.loader.shipped import IDS, base_of, file_of, is_shipped, variants_of
 from socialai_dsl.program import Header
 from socialai_dsl.program_suite import ProgramSuite, channels_of
-from socialai_dsl.schema.scenario import CastMember
+from socialai_dsl.semantics.cast import AGENT, Member, fillings, members
 from socialai_dsl.semantics.scope import Symbols
 
 _GENERATED: Final = "<!-- Written by `make sheets`; change the scenario's file and run it again. -->"
@@ -274,35 +274,40 @@ def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[
 def _cast(loaded: LoadedScenario) -> list[str]:
     columns = ("who", "role", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
     rows, drawn = [], []
-    for key in loaded.scenario.cast:
-        alternatives = loaded.scenario.alternatives(key)
-        rows.append(_member(key, alternatives[0], key == "agent"))
-        if files := loaded.scenario.cast[key].one_of:
+    for key, member in members(loaded.scenario).items():
+        rows.append(_member(member, loaded.scenario.cast[key].role or ""))
+        if member.drawn is not None:
             rows[-1] = (*rows[-1][:2], "one of the below", "", *rows[-1][4:9], "")
             drawn += ["", f"{code(key)} is one of these, drawn for each episode:", ""]
+            raws = [{key: str(one.raw) for key, one in version.items()} for version in member.versions]
             drawn += table(
                 ("which", "kind", "name", "with"),
                 [
-                    (code(file.npc), str(one.kind or ""), str(one.name or ""), entries(one.with_))
-                    for file, one in zip(files, alternatives, strict=True)
+                    (code(one["npc"]), one.get("kind", ""), one.get("name", ""), entries(fillings(version)))
+                    for one, version in zip(raws, member.versions, strict=True)
                 ],
             )
     return [*table(columns, rows), *drawn]
 
 
-def _member(key: str, member: CastMember, agent: bool) -> tuple[str, ...]:
-    where = f"[{', '.join(map(str, member.at))}]" if member.at else member.place or _DEFAULTS["place"]
+def _member(member: Member, role: str) -> tuple[str, ...]:
+    def given(key: str, default: str = "") -> str:
+        return " or ".join(dict.fromkeys(code(case.raw or default) for case in member.cases(key)))
+
+    spots = (case.raw or _DEFAULTS["place"] for case in member.cases("at", "place"))
+    cells = [f"[{', '.join(map(str, spot))}]" if isinstance(spot, tuple) else spot for spot in spots]
+    agent = member.key == AGENT
     return (
-        code(key),
-        member.role or "",
-        "" if agent else member.kind or _DEFAULTS["kind"],
-        "" if agent else code(member.name or Symbols.default_name(key)),
-        code(where),
-        code(member.facing or _DEFAULTS["facing"]),
-        "" if agent else code(member.color or _DEFAULTS["color"]),
-        str(member.view or ""),
-        code(member.frame or ""),
-        entries(member.with_),
+        code(member.key),
+        role,
+        "" if agent else str(member.value("kind") or _DEFAULTS["kind"]),
+        "" if agent else given("name", Symbols.default_name(member.key)),
+        " or ".join(map(code, cells)),
+        given("facing", _DEFAULTS["facing"]),
+        "" if agent else given("color", _DEFAULTS["color"]),
+        str(member.value("view") or ""),
+        code(member.value("frame") or ""),
+        entries(fillings(member.versions[0])),
     )
 
 

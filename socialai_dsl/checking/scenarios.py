@@ -23,6 +23,7 @@ from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import CastGroup, CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
+from socialai_dsl.semantics.cast import members
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import Data, DataPath, Node, Span
@@ -385,11 +386,17 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag, tests: Node | None = No
 
 def _patches(resolved: ResolvedFile, scenario: Scenario) -> frozenset[str] | None:
     """The files that patch a scenario, if a patch, a given parameter or a rival changes it; None: it is as written."""
-    agent = scenario.members().get(_AGENT)
-    rival_plays = agent is not None and agent.frame in scenario.rivals
+    rival_plays = _frame_of_agent(scenario) in scenario.rivals
     if not (resolved.edits or resolved.params or rival_plays):
         return None
     return frozenset(edit.span.file for edit in resolved.edits)
+
+
+def _frame_of_agent(scenario: Scenario) -> str | None:
+    """The name of the frame that the agent follows; None if it follows none, or there is no agent."""
+    agent = members(scenario).get(_AGENT)
+    frame: str | None = agent.value("frame") if agent is not None else None
+    return frame
 
 
 def with_rival(resolved: ResolvedFile, rival: str) -> ResolvedFile:
@@ -410,8 +417,7 @@ def with_findings_on_rivals(
     is judged without it, and a rival by itself.
     """
     bag, idle = DiagnosticBag(), {d for d in found if d.code in _OF_ALL_VARIANTS}
-    agent = scenario.members().get(_AGENT)
-    own_frame = agent.frame if agent is not None else None
+    own_frame = _frame_of_agent(scenario)
     judged = {d for d in idle if own_frame and _is_in(resolved.tree.get(("frames", own_frame)), d.span)}
     for name, rival in scenario.rivals.items():
         own = DiagnosticBag()

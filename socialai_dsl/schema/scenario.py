@@ -440,16 +440,6 @@ class CastMember(Character):
         None, description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *"
     )
 
-    def over(self, defaults: Character | Role) -> CastMember:
-        """This member with what it leaves out taken from `defaults`; `with` is merged key by key."""
-        given: dict[str, Any] = {name: getattr(self, name) for name in self.model_fields_set}
-        known = defaults.model_fields_set & CastMember.model_fields.keys()
-        base: dict[str, Any] = {name: getattr(defaults, name) for name in known}
-        if "place" in given or "at" in given:
-            base.pop("place", None), base.pop("at", None)
-        given["with_"] = {**(defaults.with_ if isinstance(defaults, Character) else {}), **self.with_}
-        return CastMember.model_construct(**{**base, **given})
-
 
 class CastGroup(CastMember):
     """A group in the cast as authors write it: several alike members; a list gives one value to each.
@@ -958,27 +948,6 @@ class Scenario(Model):
         default_factory=dict,
         description="name: a dialogue that `socialai test` plays; playing never reads them",
     )
-
-    def members(self) -> dict[str, CastMember]:
-        """The cast in the order written, each as its first alternative (`alternatives`)."""
-        return {name: self.alternatives(name)[0] for name in self.cast}
-
-    def alternatives(self, name: str) -> tuple[CastMember, ...]:
-        """What a member can be, one for each file of its `one_of`, else one.
-
-        What it leaves out comes from the file, then from its role (not the frame, for the agent: a role drives NPCs
-        only), then, for NPCs, from `npc_defaults`.
-        """
-        member = self.cast[name]
-        drawn = [member.over(file) for file in member.one_of or ()] or [member]
-        role = self.roles.get(member.role) if member.role is not None else None
-        if role is not None:
-            drawn = [one.over(role) for one in drawn]
-        if name != "agent":
-            return tuple(one.over(self.npc_defaults) for one in drawn)
-        if role is not None and member.frame is None:
-            drawn = [one.model_copy(update={"frame": None}) for one in drawn]
-        return tuple(drawn)
 
     def __repr__(self) -> str:
         npcs = len(self.cast.keys() - {"agent"})

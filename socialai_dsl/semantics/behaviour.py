@@ -12,7 +12,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.annotations import keys_of
 from socialai_dsl.schema.scenario import DOES, Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import abilities, addressing, groups, rows, texts, those
-from socialai_dsl.semantics.entities import AGENT
+from socialai_dsl.semantics.cast import AGENT
 from socialai_dsl.semantics.nesting import NestedPlanner
 from socialai_dsl.semantics.plans import (
     FOR_EVER,

@@ -20,7 +20,7 @@ class BeliefResolver:
 
     def __init__(self, resolver: Resolver, member: str, key: str, belief: Belief) -> None:
         self._resolver, self._member, self._key, self._belief = resolver, member, key, belief
-        self._path: DataPath = (*resolver.symbols.member_path(member, "beliefs"), key)
+        self._path: DataPath = (*resolver.symbols.cast[member].cases("beliefs")[0].path, key)
         self._site = f"cast.{member}.beliefs.{key}"
         self.register = f"{member}.believes.{key}"
 

@@ -23,8 +23,9 @@ from socialai_dsl.semantics import (
     setup,
     tables,
 )
+from socialai_dsl.semantics.cast import AGENT
 from socialai_dsl.semantics.dialogues import dialogues
-from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
+from socialai_dsl.semantics.entities import Prelude, entities_of
 from socialai_dsl.semantics.free_cells import PartialEvaluation, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import (
@@ -570,7 +571,7 @@ class _Run:
         for member, number in sorted(self._symbols.numbers.items(), key=itemgetter(1)):
             if member in self._played:
                 yield behaviour.plan(self.resolver, self._played[member], spoken[member])
-            elif self._symbols.cast[member].beliefs:
+            elif self._symbols.cast[member].value("beliefs"):
                 span = self._findings.places.key_span(("cast", member))
                 yield object_facts.watching(member, number, span)
 

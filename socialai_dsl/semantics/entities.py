@@ -19,10 +19,11 @@ from socialai_dsl.schema.scenario import (
     Sequence,
 )
 from socialai_dsl.semantics import groups, object_facts, rows, slots, texts
+from socialai_dsl.semantics.cast import AGENT, FOLLOWED, Case, Member, Version, fillings, members
 from socialai_dsl.semantics.object_facts import initial
 from socialai_dsl.semantics.plans import Entity
 from socialai_dsl.semantics.resolve_names import slot_truth
-from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Declaration, Resolver
+from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Declaration, Resolver, text_value
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
@@ -54,14 +55,12 @@ from socialai_dsl.semantics.terms import (
     SitedTerm,
     Term,
     Type,
+    constants,
 )
 from socialai_dsl.semantics.terms import number as number_of
 from socialai_dsl.semantics.words import RESERVED, VALUES
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import is_plain
-
-AGENT = "agent"
-
 
 _OF_LAYOUTS = frozenset({"let", "last", "heard", "pending", "memory", "member", "one_of", "state"})
 """Keys of layouts and descriptions beside the names of objects and members of the cast."""
@@ -93,8 +92,7 @@ def symbols_of(
     """The symbol table; reports names that are taken, unknown object types, and definitions of no form."""
     types = prelude.types
     _check_files(scenario, findings)
-    cast = scenario.members()
-    alternatives = {name: scenario.alternatives(name) for name in scenario.cast}
+    cast = members(scenario)
     npcs = [name for name in cast if name != AGENT]
     numbers = {AGENT: 0} | {name: i for i, name in enumerate(npcs, 1)}
     objects: dict[str, Objects] = {}
@@ -115,9 +113,7 @@ def symbols_of(
         base = name.partition("[")[0]
         if base != name:
             groups[base] = (*groups.get(base, ()), name)
-    symbols = Symbols(
-        scenario, cast, alternatives, numbers, roles, groups, objects, types, defines, *sizes, prelude.colors
-    )
+    symbols = Symbols(scenario, cast, numbers, roles, groups, objects, types, defines, *sizes, prelude.colors)
     return replace(symbols, slots=slots.filled(symbols, findings)) if scenario.grammar.slots else symbols
 
 
@@ -272,52 +268,66 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
 def played_frames(symbols: Symbols, findings: Findings) -> dict[str, PlayedFrame]:
     """Member -> its frame; reports unknown frames, slots left empty, and slots that do not exist."""
     played: dict[str, PlayedFrame] = {}
-    for name, alternatives in symbols.alternatives.items():
-        found = [_played(symbols, findings, name, which) for which in range(len(alternatives))]
-        frames = [frame for frame in found if frame is not None]
-        named = [alternative for alternative in alternatives if alternative.frame is not None]
-        if not frames or len(frames) < len(named):
+    for key, member in symbols.cast.items():
+        for version in member.versions:
+            _check_version(symbols, findings, version, any("frame" in one for one in member.versions))
+        if any("frame" in version and FOLLOWED not in version for version in member.versions):
             continue
-        one, *others = ((i, frame.model if frame is not None else None) for i, frame in enumerate(found))
-        other = next((i for i, model in others if model != one[1]), None)
-        if other is not None:
-            _differ(symbols, findings, name, other)
-        played[name] = frames[0]
+        first, *others = member.cases(FOLLOWED)
+        if others:
+            _differ(findings, member, first, others[0])
+        followed = next((case for case in (first, *others) if case.raw is not None), None)
+        if followed is not None:
+            called, path = str(followed.path[-1]), followed.path
+            played[key] = played_frame(symbols, findings, key, called, followed.raw, path)
     return played
 
 
-def _differ(symbols: Symbols, findings: Findings, name: str, which: int) -> None:
-    files = symbols.scenario.cast[name].one_of or ()
-    frames = [symbols.alternatives[name][i].frame for i in (which, 0)]
-    called = [f"`{files[i].npc}`" for i in (which, 0)]
-    message = f"{called[0]} and {called[1]} follow different frames"
-    if None in frames:
-        one, other = (f"the frame `{frame}`" if frame is not None else "no frame" for frame in frames)
-        message = f"{called[0]} follows {one}, {called[1]} follows {other}"
+def _differ(findings: Findings, member: Member, first: Case, other: Case) -> None:
+    """Report two versions of a member that follow different frames."""
+    (one, _), (two, place) = (member.versions[case.numbers[0]]["npc"] for case in (first, other))
+    message = f"`{two}` and `{one}` follow different frames"
+    if None in (first.raw, other.raw):
+        of_one, of_two = (
+            f"the frame `{case.path[-1]}`" if case.raw is not None else "no frame" for case in (first, other)
+        )
+        message = f"`{two}` follows {of_two}, `{one}` follows {of_one}"
     message += "; what is drawn by `one_of` shares one"
-    span = findings.places.value_span(("cast", name, "one_of", which, "npc"))
     hint = "let both extend a file with the frame, and put what differs into its slots"
-    findings.error("S315", message, span, hint=hint)
+    findings.error("S315", message, findings.places.value_span(place), hint=hint)
 
 
-def _played(symbols: Symbols, findings: Findings, name: str, which: int) -> PlayedFrame | None:
-    """The frame that a member follows as one of its alternatives."""
-    member = symbols.alternatives[name][which]
-    if member.frame is None:
-        if member.with_:
-            _check_no_slots(name, symbols, findings)
-        return None
-    followed = symbols.frame_of(name, which)
-    if followed is None:
-        path = symbols.member_path(name, "frame", which)
-        files = symbols.scenario.cast[name].one_of
-        near = did_you_mean(member.frame, [*symbols.scenario.frames, *(files[which].frames if files else ())])
-        span = findings.at(path, 0, len(member.frame))
-        findings.no_such(member.frame, f"unknown frame `{member.frame}`", span, suggestion=near)
-        return None
-    frame, path = followed
-    _check_slots(name, which, frame, symbols, findings)
-    return played_frame(symbols, findings, name, member.frame, frame, path)
+def _check_version(symbols: Symbols, findings: Findings, version: Version, framed: bool) -> None:
+    """Whether a member follows a frame that there is, and fills its slots; `framed`: one of its versions has one."""
+    filled = {slot: version[f"with.{slot}"].path for slot in fillings(version)}
+    own = {slot: path for slot, path in filled.items() if path[0] == "cast"}
+    called, place = version["npc"]
+    frame = version.get("frame")
+    if frame is None:
+        for slot, path in own.items() if not framed else ():
+            who = called if "one_of" in path else path[1]
+            message = f"`{who}` follows no frame, so it has no slot `{slot}`"
+            findings.error("S303", message, findings.places.key_span(path), hint="add `frame:`")
+        return
+    if FOLLOWED not in version:
+        near = did_you_mean(frame.raw, [str(path[-1]) for path, _ in frames_of(symbols.scenario)])
+        message = f"unknown frame `{frame.raw}`"
+        findings.no_such(frame.raw, message, findings.at(frame.path, 0, len(frame.raw)), suggestion=near)
+        return
+    slots = version[FOLLOWED].raw.slots
+    for slot, type_ in slots.items():
+        if slot not in filled and did_you_mean(slot, [s for s in filled if s not in slots]) is None:
+            message = f"frame `{frame.raw}` has a slot `{slot}` ({type_}) that `{called}` does not fill"
+            hint = f"add `with: {{{slot}: ...}}`"
+            findings.error("S302", message, findings.places.key_span(place), hint=hint)
+    for slot, path in own.items():
+        if slot not in slots:
+            near = did_you_mean(slot, slots)
+            has = "its slots are " + ", ".join(slots) if slots else "it has no slots"
+            findings.error(
+                "S303", f"frame `{frame.raw}` has no slot `{slot}`", findings.places.key_span(path),
+                suggestion=near, hint=None if near else has,
+            )  # fmt: skip
 
 
 def played_frame(
@@ -330,11 +340,8 @@ def played_frame(
     looked_at: bool = False,
 ) -> PlayedFrame:
     """A frame as a member plays it; slots that are not filled have no text."""
-    alternatives = symbols.alternatives[member]
     texts = {
-        slot: tuple(symbols.with_path(member, slot, which) for which in range(len(alternatives)))
-        if not looked_at and all(slot in alternative.with_ for alternative in alternatives)
-        else None
+        slot: symbols.cast[member].filling(slot) if not looked_at else None
         for slot, type_ in frame.slots.items()
         if type_ in SUBSTITUTED
     }
@@ -345,47 +352,14 @@ def played_frame(
 def check_slots(resolver: Resolver) -> None:
     """Everything that fills a slot is looked at, though the frame may never use it."""
     for member, played in resolver.frames.items():
-        for slot, paths in played.texts.items():
-            for which, path in enumerate(paths or ()):
-                filled = resolver.symbols.alternatives[member][which].with_[slot]
-                scope = step_scope(path, f"cast.{member}.with.{slot}", member)
+        for slot, cases in played.texts.items():
+            for case in cases or ():
+                scope = step_scope(case.path, f"cast.{member}.with.{slot}", member)
                 with surviving():
                     if played.model.slots[slot] == "bool":
-                        slot_truth(resolver, slot, filled, scope)
+                        slot_truth(resolver, slot, case.raw, scope)
                     else:
-                        texts.parts(resolver, resolver.findings.text(path, str(filled)), scope)
-
-
-def _check_no_slots(name: str, symbols: Symbols, findings: Findings) -> None:
-    own = symbols.scenario.cast[name].with_
-    for slot in own:
-        findings.error(
-            "S303", f"`{name}` follows no frame, so it has no slot `{slot}`",
-            findings.places.key_span(("cast", name, "with", slot)), hint="add `frame:`",
-        )  # fmt: skip
-
-
-def _check_slots(name: str, which: int, frame: Frame, symbols: Symbols, findings: Findings) -> None:
-    member = symbols.alternatives[name][which]
-    files = symbols.scenario.cast[name].one_of
-    called = files[which].npc if files else name
-    place: DataPath = ("cast", name, "one_of", which, "npc") if files else ("cast", name)
-    for slot, type_ in frame.slots.items():
-        near = did_you_mean(slot, [s for s in member.with_ if s not in frame.slots])
-        if slot not in member.with_ and near is None:
-            findings.error(
-                "S302", f"frame `{member.frame}` has a slot `{slot}` ({type_}) that `{called}` does not fill",
-                findings.places.key_span(place), hint=f"add `with: {{{slot}: ...}}`",
-            )  # fmt: skip
-    for slot in member.with_:
-        path = symbols.with_path(name, slot, which)
-        if slot not in frame.slots and path[0] == "cast":
-            near = did_you_mean(slot, frame.slots)
-            has = "its slots are " + ", ".join(frame.slots) if frame.slots else "it has no slots"
-            findings.error(
-                "S303", f"frame `{member.frame}` has no slot `{slot}`", findings.places.key_span(path),
-                suggestion=near, hint=None if near else has,
-            )  # fmt: skip
+                        texts.parts(resolver, resolver.findings.text(case.path, str(case.raw)), scope)
 
 
 # -- registers ---------------------------------------------------------------------------------------------------
@@ -394,8 +368,11 @@ def _check_slots(name: str, which: int, frame: Frame, symbols: Symbols, findings
 def declare_registers(resolver: Resolver) -> None:
     """Make every register known: what is drawn by `one_of`, lets, names, and each frame's slots and registers."""
     symbols, registers = resolver.symbols, resolver.registers
-    for name in symbols.cast:
-        _declare_file(resolver, name)
+    for name, member in symbols.cast.items():
+        if member.drawn is not None:
+            pick = Quantification(member.drawn.type, "pick", "each", constants(member.drawn.type), None)
+            span = resolver.findings.places.key_span(("cast", name, "one_of"))
+            registers.put(member.drawn.path, SitedTerm(pick, f"cast.{member.drawn.path}", span))
     for name, raw in symbols.scenario.let.items():
         path: DataPath = ("let", name)
         if isinstance(raw, Sequence):
@@ -414,43 +391,23 @@ def declare_registers(resolver: Resolver) -> None:
         declare_frame(resolver, played)
 
 
-def _declare_file(resolver: Resolver, name: str) -> None:
-    """Which of the files of a `one_of` is drawn."""
-    files = resolver.symbols.scenario.cast[name].one_of
-    if not files:
-        return
-    words = tuple(file.npc for file in files)
-    type_ = Type("text", 0, len(words) - 1, words)
-    values = tuple(Const(type_, value) for value in range(len(words)))
-    drawn = Quantification(type_, "pick", "each", values, None)
-    span = resolver.findings.places.key_span(("cast", name, "one_of"))
-    resolver.registers.draw_file(name, SitedTerm(drawn, f"cast.{name}.one_of", span))
-
-
 def declare_name(resolver: Resolver, name: str) -> None:
     """The name of a member of the cast; by default its key."""
-    symbols = resolver.symbols
+    symbols, registers, register = resolver.symbols, resolver.registers, f"{name}.name"
     default = symbols.default_name(name)
-    names = [member.name if member.name is not None else default for member in symbols.alternatives[name]]
-    raws = [str(raw) if isinstance(raw, int) else raw for raw in names]
-    plain = [symbols.cast[name].name is None or is_plain_name(resolver, raw) for raw in raws]
-    if all(plain):
-        known = [Const(Type("text", 0, 0, (raw,)), 0) for raw in raws]
-        term = select(resolver.registers.drawn_file(name), known)
+    cases = symbols.cast[name].cases("name")
+    if all(case.raw is None or is_plain_name(resolver, str(case.raw)) for case in cases):
+        term = select(cases, [text_value(default if case.raw is None else str(case.raw)) for case in cases])
         if isinstance(term, Const):
-            resolver.registers.known(f"{name}.name", term)
+            registers.known(register, term)
         else:
             span = resolver.findings.places.key_span(("cast", name, "one_of"))
-            resolver.registers.put(f"{name}.name", SitedTerm(term, f"cast.{name}.name", span))
+            registers.put(register, SitedTerm(term, f"cast.{register}", span))
         return
-    written = [(symbols.member_path(name, "name", which), raw) for which, raw in enumerate(raws)]
-    (path, raw), *others = written
-    scope = reset_scope(path, f"cast.{name}.name", name)
-    resolver.registers.declare(
-        Declaration(
-            f"{name}.name", f"{name}.name", path, raw, scope, ANY_TEXT, constant=True, others=tuple(others)
-        )
-    )
+    raws = (f'"{default}"' if case.raw is None else str(case.raw) for case in cases)
+    named = tuple(replace(case, raw=raw) for case, raw in zip(cases, raws, strict=True))
+    scope = reset_scope(cases[0].path, f"cast.{register}", name)
+    registers.declare(Declaration(register, register, cases[0].path, named, scope, ANY_TEXT, constant=True))
 
 
 def is_plain_name(resolver: Resolver, raw: str) -> bool:
@@ -518,9 +475,8 @@ def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:
 
 
 def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None:
-    symbols = resolver.symbols
-    alternatives = symbols.alternatives[member]
-    if not all(slot in alternative.with_ for alternative in alternatives):
+    cases = resolver.symbols.cast[member].filling(slot)
+    if cases is None:
         return
     types = {
         "object": ENTITY,
@@ -528,18 +484,12 @@ def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None
         "direction": DIRECTION,
         "color": COLOR,
         "int": INT,
-        "noun": symbols.nouns,
+        "noun": resolver.symbols.nouns,
         "cell": CELL,
     }
-    written = [
-        (symbols.with_path(member, slot, which), alternative.with_[slot])
-        for which, alternative in enumerate(alternatives)
-    ]
-    (path, raw), *others = written
+    path = cases[0].path
     scope = reset_scope(path, f"cast.{member}.with.{slot}", member)
-    resolver.registers.declare(
-        Declaration(f"{member}.{slot}", slot, path, raw, scope, types[kind], others=tuple(others))
-    )
+    resolver.registers.declare(Declaration(f"{member}.{slot}", slot, path, cases, scope, types[kind]))
 
 
 # -- the list of entities ------------------------------------------------------------------------------------
@@ -548,65 +498,60 @@ def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None
 VIEW = 7
 """Side of the view square where none is given."""
 
+_WITH_CASES = frozenset({"name", "kind", "kind_code", "color", "place", "at", "facing", "frame"})
+"""Keys whose value may depend on what is drawn; `frame` is compared as what it names."""
+
 
 def entities_of(resolver: Resolver) -> Iterator[Entity]:
     """The agent, the NPCs in cast order, the objects in file order."""
     symbols = resolver.symbols
     kinds: list[str] = []
     for name in (AGENT, *(n for n in symbols.cast if n != AGENT)):
-        members = symbols.alternatives[name]
-        member = members[0]
-        codes = [] if name == AGENT else [_code(one, kinds) for one in members]
+        member, npc = symbols.cast[name], name != AGENT
+        codes = [_code(version, kinds) for version in member.versions] if npc else []
         with surviving():
-            _check_shared(resolver, name)
-            near, far = _voice(resolver, name, member)
+            _check_shared(resolver, member)
+            near, far = _voice(resolver, member)
             number = symbols.numbers[name]
             group = symbols.group_of(name)
             yield Entity(
                 number=number,
                 key=name if group is None else group[0],
                 index=None if group is None else group[1],
-                role="agent" if name == AGENT else "npc",
+                role="npc" if npc else "agent",
                 span=resolver.findings.places.key_span(("cast", name)),
-                kind=""
-                if name == AGENT
-                else " or ".join(dict.fromkeys(one.kind or "peer" for one in members)),
+                kind=" or ".join(case.raw or "peer" for case in member.cases("kind")) if npc else "",
                 kind_code=max(codes, default=0),
-                kind_drawn=select(resolver.registers.drawn_file(name), [number_of(c) for c in codes])
+                kind_drawn=select(member.each("kind"), [number_of(code) for code in codes])
                 if len(set(codes)) > 1
                 else None,
                 name=resolver.registers.read(f"{name}.name"),
                 near=near,
                 far=far,
-                audible=member.audible == "always",
+                audible=member.value("audible") == "always",
                 tone=rows.tone_of(resolver, number) if symbols.scenario.observe.tone and number else None,
-                view=member.view if member.view is not None else VIEW,
+                view=member.value("view") or VIEW,
             )
     statuses = initial(resolver)
     for objects in symbols.objects.values():
         yield from _objects(resolver, objects, statuses)
 
 
-def _code(member: CastMember, kinds: list[str]) -> int:
+def _code(version: Version, kinds: list[str]) -> int:
     """The status code in the picture: the place of its kind in order of first appearance, if none is given."""
-    kind = member.kind or "peer"
+    kind = version["kind"].raw if "kind" in version else "peer"
     if kind not in kinds:
         kinds.append(kind)
-    return member.kind_code if member.kind_code is not None else kinds.index(kind)
+    return version["kind_code"].raw if "kind_code" in version else kinds.index(kind)
 
 
-def _check_shared(resolver: Resolver, name: str) -> None:
-    """What the files of a `one_of` must have in common."""
-    members = resolver.symbols.alternatives[name]
-    for key in ("earshot", "view", "audible", "accepts"):
-        other = next(
-            (i for i, one in enumerate(members) if getattr(one, key) != getattr(members[0], key)), None
-        )
-        if other is not None:
-            span = resolver.findings.places.key_span(resolver.symbols.member_path(name, key, other))
+def _check_shared(resolver: Resolver, member: Member) -> None:
+    """What all that a member can be must have in common: each key of which the language has no cases."""
+    for key in CastMember.model_fields.keys() - _WITH_CASES:
+        for other in member.cases(key)[1:]:
             message = f"what is drawn by `one_of` has one and the same `{key}`"
-            hint = f"give `{key}` beside `one_of`"
-            raise resolver.findings.fail("S315", message, span, hint=hint)
+            span = resolver.findings.places.key_span(other.path)
+            resolver.findings.error("S315", message, span, hint=f"give `{key}` beside `one_of`")
 
 
 def _objects(
@@ -675,15 +620,10 @@ def _check_exclusive(resolver: Resolver, objects: Objects) -> None:
         resolver.findings.error("S204", message, span)
 
 
-def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]:
+def _voice(resolver: Resolver, member: Member) -> tuple[int, int]:
     """Least and greatest Manhattan distance at which a voice is heard."""
-    symbols = resolver.symbols
-    if member.earshot is None:
-        path: DataPath = ("earshot",)
-        raw = symbols.scenario.earshot
-    else:
-        path = symbols.member_path(name, "earshot")
-        raw = member.earshot
+    symbols, (own, *_) = resolver.symbols, member.cases("earshot")
+    raw, path = (own.raw, own.path) if own.raw is not None else (symbols.scenario.earshot, ("earshot",))
     if raw == "next_to":
         return 1, 1
     if raw == "room":

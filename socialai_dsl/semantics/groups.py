@@ -479,8 +479,8 @@ def _colors(resolver: Resolver, number: int) -> frozenset[int]:
         place = 0 if single else objects.numbers.index(number)
         return _written(resolver, given[place]) if place < len(given) else _ALL_COLORS
     member = symbols.member_of(number)
-    raws = [one.color for one in symbols.alternatives[member]] if member is not None else [None]
-    return frozenset().union(*(_written(resolver, raw) for raw in raws))
+    cases = symbols.cast[member].cases("color") if member is not None else ()
+    return frozenset().union(*(_written(resolver, case.raw) for case in cases)) or _ALL_COLORS
 
 
 def _written(resolver: Resolver, raw: object) -> frozenset[int]:
@@ -604,24 +604,24 @@ def acts_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> ActSequence | N
 
 
 def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> ActSequence:
-    """The sequence that fills a slot, the same in every file of a `one_of`."""
-    symbols, findings = resolver.symbols, resolver.findings
-    alternatives = symbols.alternatives[member]
-    if looked_at or not all(slot in alternative.with_ for alternative in alternatives):
+    """The sequence that fills a slot, the same in all cases."""
+    findings, cases = resolver.findings, resolver.symbols.cast[member].filling(slot)
+    if looked_at or cases is None:
         raise FailedError  # a slot that nobody fills is reported where it is left empty
     found: list[ActSequence] = []
-    for which, alternative in enumerate(alternatives):
-        path = symbols.with_path(member, slot, which)
-        node = findings.expression(path, alternative.with_[slot])
-        acts = acts_at(resolver, node, Scope(path, Draws(f"cast.{member}.with.{slot}"), member))
-        if acts is None and resolver.is_bare(node, Scope(path, Draws(""), member)):
-            resolver.value(node, None, Scope(path, Draws(""), member))
+    for case in cases:
+        node = findings.expression(case.path, case.raw)
+        acts = acts_at(resolver, node, Scope(case.path, Draws(f"cast.{member}.with.{slot}"), member))
+        if acts is None and resolver.is_bare(node, Scope(case.path, Draws(""), member)):
+            resolver.value(node, None, Scope(case.path, Draws(""), member))
         if acts is None or acts.remembered:
             hint = "a sequence is drawn in `let`: {sequence: 3, moves: [left, right, forward]}"
-            raise findings.fail("S204", f"`{quoted(node)}` is not a sequence", findings.at(path), hint=hint)
+            raise findings.fail(
+                "S204", f"`{quoted(node)}` is not a sequence", findings.at(case.path), hint=hint
+            )
         if found and acts != found[0]:
             message = f"the files of `{member}` have different sequences in `{slot}`; they must share one"
-            raise findings.fail("S315", message, findings.at(path))
+            raise findings.fail("S315", message, findings.at(case.path))
         found.append(acts)
     return found[0]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from socialai_dsl.semantics.entities import AGENT
+from socialai_dsl.semantics.cast import AGENT, Member
 from socialai_dsl.semantics.resolver import Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import surviving
 from socialai_dsl.semantics.terms import Line, Term
@@ -21,9 +21,9 @@ def check_speakers(resolver: Resolver, spoken: Spoken) -> None:
     findings, symbols = resolver.findings, resolver.symbols
     divides = re.compile(":| to " if resolver.addresses else ":")
     for member in symbols.cast:
-        path = symbols.member_path(member, "name")
         with surviving():
             for name in words_of_values(resolver.registers.read(f"{member}.name").type):
+                path = _place_of(name, symbols.cast[member])
                 mark = divides.search(composed(name))
                 if findings.must_be_one_line(path, name) and mark is not None:
                     what = "a colon" if mark.group() == ":" else "` to `"
@@ -53,7 +53,7 @@ def report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> N
                 message = (
                     f"`{text}` and `{known}`, which `{first}` is called, look alike and are not the same name"
                 )
-                _warn(resolver, message, findings.at(symbols.member_path(member, "name")))
+                _warn(resolver, message, findings.at(_place_of(text, symbols.cast[member])))
     heard: dict[tuple[str, str], tuple[str, Span]] = {}
     told: set[Span] = set()
     for member, lines in spoken.items():
@@ -66,6 +66,12 @@ def report_alike(resolver: Resolver, spoken: Spoken, names: Iterable[Term]) -> N
                     where = f"line {span.line}" if span.file == line.span.file else str(span)
                     message = f'"{text}" and "{known}" ({where}) look alike and are not the same text'
                     _warn(resolver, message, line.span)
+
+
+def _place_of(name: str, member: Member) -> DataPath:
+    """Where a name of a member is written."""
+    cases = member.cases("name")
+    return next((case.path for case in cases if name in str(case.raw)), cases[0].path)
 
 
 def _warn(resolver: Resolver, message: str, span: Span) -> None:

@@ -9,15 +9,17 @@ from itertools import pairwise
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
-from socialai_dsl.schema.scenario import Register, Scenario
+from socialai_dsl.schema.scenario import Belief, Register, Scenario
 from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.believing import BeliefResolver
+from socialai_dsl.semantics.cast import fillings, members
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, ComputedStatus, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import (
     FailedError,
     Objects,
     Scope,
+    Symbols,
     frames_of,
     object_scope,
     of_each,
@@ -142,13 +144,15 @@ def _sources(scenario: Scenario) -> dict[str, list[object]]:
     """Name -> the expressions that it may stand for: lets, definitions, registers with what they are set to, slots."""
     found: dict[str, list[object]] = {}
     declared: list[Mapping[str, object]] = [scenario.let, scenario.define]
-    declared += [member.with_ for name in scenario.cast for member in scenario.alternatives(name)]
     for _, frame in frames_of(scenario):
         declared += [frame.let, frame.define, *(entry.set for entry in frame.all_effects())]
     for mapping in declared:
         for name, source in mapping.items():
             value = source.start if isinstance(source, Register) else source
             found.setdefault(name.partition("(")[0].strip(), []).append(value)
+    for version in (version for member in members(scenario).values() for version in member.versions):
+        for slot, filling in fillings(version).items():
+            found.setdefault(slot, []).append(filling)
     return found
 
 
@@ -426,32 +430,36 @@ def register_of(member: str, key: str) -> str:
     return f"{member}.believes.{key}"
 
 
+def _beliefs(symbols: Symbols) -> Iterator[tuple[str, str, Belief]]:
+    """Every belief, with who has it and its name."""
+    for member in symbols.cast.values():
+        yield from ((member.key, key, belief) for key, belief in (member.value("beliefs") or {}).items())
+
+
 def declare(resolver: Resolver) -> None:
     """Make every belief known; by default it starts with what is true when the episode begins."""
-    for name, member in resolver.symbols.cast.items():
-        for key, belief in member.beliefs.items():
-            with surviving():
-                resolver.registers.declare(BeliefResolver(resolver, name, key, belief).declaration())
+    for name, key, belief in _beliefs(resolver.symbols):
+        with surviving():
+            resolver.registers.declare(BeliefResolver(resolver, name, key, belief).declaration())
 
 
 def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
     """The beliefs that members update at the start of their turns."""
-    for name, member in resolver.symbols.cast.items():
-        for key, belief in member.beliefs.items():
-            with surviving():
-                if register_of(name, key) in resolver.registers:
-                    yield from BeliefResolver(resolver, name, key, belief).plans()
+    for name, key, belief in _beliefs(resolver.symbols):
+        with surviving():
+            if register_of(name, key) in resolver.registers:
+                yield from BeliefResolver(resolver, name, key, belief).plans()
 
 
 def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:
     """Members who do not take everything they are given, each with the register of the step that says whether."""
     for name, member in resolver.symbols.cast.items():
-        if member.accepts is None:
+        accepts, *_ = member.cases("accepts")
+        if accepts.raw is None:
             continue
-        path = resolver.symbols.member_path(name, "accepts")
         with surviving():
-            scope = step_scope(path, f"cast.{name}.accepts", name)
-            asked = resolver.sited(member.accepts, BOOL, scope)
+            scope = step_scope(accepts.path, f"cast.{name}.accepts", name)
+            asked = resolver.sited(accepts.raw, BOOL, scope)
             if not hands.carryable(resolver):
                 message = "nothing here can be given"
                 raise hands.nothing_carried(resolver, message, asked.span)
@@ -473,7 +481,7 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
     if None in members:
         raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)
     for member in map(str, members):
-        known = resolver.symbols.cast[member].beliefs
+        known = resolver.symbols.cast[member].value("beliefs") or {}
         if node.name not in known:
             if member == scope.member and scope.frame is not None and scope.frame.looked_at:
                 raise FailedError  # who believes it plays this frame elsewhere

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.semantics.cast import members
 from socialai_dsl.semantics.scope import frames_of
 from socialai_dsl.semantics.terms import Type
 from socialai_dsl.widths import LARGEST_NUMBER
@@ -36,7 +37,7 @@ class Ranges:
         self._gains: dict[str, int] = {}
         self._narrowings = 0
         self._wide: dict[str, Type] | None = None
-        followed = Counter(member.frame for member in scenario.members().values())
+        followed = Counter(member.value("frame") for member in members(scenario).values())
         setters = sum(bool(rule.set) for rule in scenario.rules)
         for path, frame in frames_of(scenario):
             own = sum(bool(entry.set) for entry in frame.all_effects())

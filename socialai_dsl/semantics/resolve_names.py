@@ -12,6 +12,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
 from socialai_dsl.semantics import object_facts, rows, slots, texts
+from socialai_dsl.semantics.cast import grouped
 from socialai_dsl.semantics.groups import check_moment, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
@@ -22,9 +23,7 @@ from socialai_dsl.semantics.scope import (
     PlayedFrame,
     Scope,
     as_text,
-    by_value,
     described,
-    drawn,
     of_each,
     quoted,
     usage,
@@ -225,7 +224,7 @@ def _substituted(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
 
 
 def _member_text(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
-    """The text that fills a slot, in the file that was drawn if there are several; with `<...>` it can only be said."""
+    """The text that fills a slot; with `<...>` it can only be said."""
     slot = texts.text_slot(resolver, node, scope)
     assert slot is not None, "internal: a slot of type text"
     if any(filling.text.plain is None for filling in slot):
@@ -233,25 +232,22 @@ def _member_text(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
             f"`{node.id}` is filled with a text that has <...>: it can be said or heard, not computed with"
         )
         raise resolver.fail("S204", message, node, scope)
-    return texts.plain_text(resolver, slot)
+    return texts.plain_text(slot)
 
 
 def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope) -> Term:
-    """The condition that fills a slot of type bool, in the file that was drawn if there are several."""
-    member, paths = frame.member, frame.texts[slot]
-    if paths is None:
+    """The condition that fills a slot of type bool: in one of its cases it is true."""
+    filled = frame.texts[slot]
+    if filled is None:
         raise FailedError  # nobody fills it, which is reported where it is left empty
-    described = resolver.symbols.alternatives[member]
-    truths = [
-        slot_truth(resolver, slot, described[which].with_[slot], with_scope(path, member, slot, scope))
-        for which, path in enumerate(paths)
-    ]
-    cases = []
-    for truth, numbers in by_value(truths).items():
-        if truth != FALSE:
-            chosen = drawn(resolver.registers.drawn_file(member), numbers)
-            cases.append(truth if chosen is None else all_of([chosen, truth]))
-    return any_of(cases)
+    cases = grouped(filled)
+    scopes = (with_scope(case.path, frame.member, slot, scope) for case in cases)
+    truths = [slot_truth(resolver, slot, case.raw, own) for case, own in zip(cases, scopes, strict=True)]
+    return any_of(
+        truth if case.when is None else all_of([case.when, truth])
+        for case, truth in zip(cases, truths, strict=True)
+        if truth != FALSE
+    )
 
 
 def slot_truth(resolver: Resolver, slot: str, raw: object, scope: Scope) -> Term:
@@ -401,9 +397,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         )
     if word in resolver.symbols.scenario.tables:
         return resolver.fail("S211", f"`{word}` is a table: write `{word}(key)`", node, scope)
-    called = next(
-        (key for key, member in resolver.symbols.scenario.cast.items() if member.name == word), None
-    )
+    cast = resolver.symbols.cast
+    called = next((key for key in cast if any(case.raw == word for case in cast[key].cases("name"))), None)
     if called is not None:
         message, cure = (
             f"`{word}` is what somebody is called",

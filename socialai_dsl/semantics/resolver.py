@@ -15,6 +15,7 @@ from typing import ClassVar, Final, Unpack
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import Advice
 from socialai_dsl.grammar import ast
+from socialai_dsl.semantics.cast import Cases
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -191,8 +192,7 @@ class Declaration:
 
     Attributes:
         path: its name, `let.exit` or `wizard.goal`. label: how messages call it.
-        source, raw: the expression and where it stands. scope: what its names mean.
-        others: what stands in its place in the other files of a `one_of` whose first file `source` is in.
+        source, raw: the expression, or all that it can be, and where it stands. scope: what its names mean.
         expected: its type, if its declaration says it.
         range: the numbers it keeps to, if its declaration says them.
         constant: a known value needs no register.
@@ -205,13 +205,12 @@ class Declaration:
     path: str
     label: str
     source: DataPath
-    raw: Scalar
+    raw: Scalar | Cases
     scope: Scope
     expected: Type | None = None
     range: Type | None = None
     constant: bool = False
     imagined: bool = False
-    others: tuple[tuple[DataPath, Scalar], ...] = ()
     for_each: tuple[Const, ...] = ()
     each: tuple[tuple[DataPath, Scalar], ...] = ()
     starts_with_nothing: bool = False
@@ -363,14 +362,6 @@ class Registers:
             )
         self.words[declaration.path] = expected
 
-    def draw_file(self, member: str, value: SitedTerm) -> None:
-        """Which file of a member's `one_of` is drawn."""
-        self.put(f"{member}.one_of", value)
-
-    def drawn_file(self, member: str) -> Term | None:
-        """The number of the file of a member's `one_of` that was drawn; None if there is nothing to draw."""
-        return self._terms.get(f"{member}.one_of")
-
     def drawn_at_reset(self, path: str) -> Term | None:
         """The value that a register gets at reset and keeps; None for a constant, or if rules can set it."""
         drawn, declaration = self._drawn.get(path, ()), self._declared.get(path)
@@ -451,12 +442,15 @@ class Registers:
             start = SitedTerm(Const(holds, holds.low), scope.draws.site, span)
             return [(start, self._called(path, key)) for key in declaration.for_each] or [(start, path)]
         if not declaration.for_each:
-            return [(SitedTerm(self._written(declaration, expected), scope.draws.site, span), path)]
+            value = self._resolver.written(
+                declaration.raw, expected, scope.at(declaration.source, scope.draws.site)
+            )
+            return [(SitedTerm(value, scope.draws.site, span), path)]
         starts = []
         for i, key in enumerate(declaration.for_each):
             source, raw = declaration.each[i] if declaration.each else (declaration.source, declaration.raw)
             own = replace(scope.at(source, f"{scope.draws.site}[{i}]"), it=key)
-            term = self._written(replace(declaration, source=source, raw=raw, scope=own), expected)
+            term = self._resolver.written(raw, expected, own)
             starts.append((SitedTerm(term, own.draws.site, span), self._called(path, key)))
         return starts
 
@@ -488,19 +482,6 @@ class Registers:
             )
             raise findings.fail("S106", message, findings.at(declaration.source))
         return given
-
-    def _written(self, declaration: Declaration, expected: Type | None) -> Term:
-        """The value of a declaration: what its expression says, or what that of the file says which was drawn."""
-        scope = declaration.scope
-        written = [(declaration.source, declaration.raw), *declaration.others]
-        terms = [
-            self._resolver.written(raw, expected, scope.at(source, scope.draws.site))
-            for source, raw in written
-        ]
-        if len(terms) == 1:
-            return terms[0]
-        assert scope.member is not None, "internal: only members of the cast have alternatives"
-        return select(self.drawn_file(scope.member), terms)
 
     def _circle(self, path: str) -> FailedError:
         circle = [self._declared[p] for p in self._busy[self._busy.index(path) :]]
@@ -598,8 +579,11 @@ class Resolver(ABC):
     def meaning(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         """The term for a tree by what kind of node it is; `value` keeps how it was written as well."""
 
-    def written(self, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
-        """The value of the expression that is written at the scope's path; raises FailedError once it is reported."""
+    def written(self, raw: Scalar | Cases, expected: Type | None, scope: Scope) -> Term:
+        """The value that is written at the scope's path, or has these cases; raises FailedError once it is reported."""
+        if isinstance(raw, tuple):
+            values = [self.written(one.raw, expected, scope.at(one.path, scope.draws.site)) for one in raw]
+            return select(raw, values)
         if isinstance(raw, str) and expected is not None and expected.kind in ("text", "noun"):
             literal = self._literal(raw, expected)
             if literal is not None:

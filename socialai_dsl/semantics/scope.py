@@ -15,7 +15,8 @@ from socialai_dsl.diagnostics import Advice, DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text, rebuilt, unparse
 from socialai_dsl.schema.annotations import held_at
-from socialai_dsl.schema.scenario import CastMember, Expression, Frame, Scenario
+from socialai_dsl.schema.scenario import Expression, Frame, Scenario
+from socialai_dsl.semantics.cast import Cases, Member
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
     SIDE,
@@ -34,7 +35,6 @@ from socialai_dsl.semantics.terms import (
     integer,
     may_be_nothing,
     numbers_of,
-    one_of,
     where_it_is_found,
     where_there_is,
 )
@@ -398,8 +398,7 @@ class Symbols:
     """Everything a scenario declares, by name.
 
     Attributes:
-        cast: member -> its description with defaults filled in, the agent too, in the order written.
-        alternatives: member -> everything it can be: one for each file of its `one_of`, else only `cast[member]`.
+        cast: the members, the agent too, in the order written.
         numbers: member -> number of its entity.
         roles: role -> the member that plays it.
         groups: name of a group in the cast -> its members.
@@ -410,8 +409,7 @@ class Symbols:
     """
 
     scenario: Scenario
-    cast: Mapping[str, CastMember]
-    alternatives: Mapping[str, tuple[CastMember, ...]]
+    cast: Mapping[str, Member]
     numbers: Mapping[str, int]
     roles: Mapping[str, str]
     groups: Mapping[str, tuple[str, ...]]
@@ -450,44 +448,6 @@ class Symbols:
     def member_of(self, number: int) -> str | None:
         """The cast member with this number; None for objects."""
         return next((name for name, n in self.numbers.items() if n == number), None)
-
-    def member_path(self, name: str, key: str, which: int = 0) -> DataPath:
-        """Where a key of a cast member, as alternative `which`, was written: there, in the file that was drawn, in its
-        role, or in `npc_defaults`.
-        """
-        attribute = {"with": "with_"}.get(key, key)
-        own = self.scenario.cast[name]
-        if attribute in own.model_fields_set:
-            return ("cast", name, key)
-        if own.one_of and attribute in own.one_of[which].model_fields_set:
-            return ("cast", name, "one_of", which, key)
-        role = self.scenario.roles.get(own.role) if own.role is not None else None
-        if role is not None and attribute in role.model_fields_set:
-            return ("roles", str(own.role), key)
-        if attribute in self.scenario.npc_defaults.model_fields_set and name != "agent":
-            return ("npc_defaults", key)
-        return ("cast", name, key)
-
-    def with_path(self, name: str, slot: str, which: int = 0) -> DataPath:
-        """Where the value of a member's slot was written."""
-        own = self.scenario.cast[name]
-        if slot in own.with_:
-            return ("cast", name, "with", slot)
-        if own.one_of and slot in own.one_of[which].with_:
-            return ("cast", name, "one_of", which, "with", slot)
-        return ("npc_defaults", "with", slot)
-
-    def frame_of(self, name: str, which: int = 0) -> tuple[Frame, DataPath] | None:
-        """The frame that a member follows and where it is written; None if it follows none, or an unknown one."""
-        called = self.alternatives[name][which].frame
-        own = self.scenario.cast[name]
-        if called is None:
-            return None
-        if own.one_of and called in own.one_of[which].frames:
-            return own.one_of[which].frames[called], ("cast", name, "one_of", which, "frames", called)
-        if called in self.scenario.frames:
-            return self.scenario.frames[called], ("frames", called)
-        return None
 
     def members_of(self, numbers: Iterable[int]) -> list[str | None]:
         """The same of several numbers."""
@@ -540,8 +500,8 @@ class PlayedFrame:
         name, model: the frame.
         defines: its definitions.
         path: where it is written.
-        texts: slots that are substituted wherever they are used (text, utterance, bool) -> where each alternative of
-            the member fills them; None if nobody does, as when a frame is only looked at.
+        texts: slots that are substituted wherever they are used (text, utterance, bool) -> what fills them; None if
+            nobody does, as when a frame is only looked at.
         looked_at: nobody plays it; it is checked all the same.
     """
 
@@ -551,7 +511,7 @@ class PlayedFrame:
     model: Frame
     path: DataPath
     defines: Mapping[str, Define]
-    texts: Mapping[str, tuple[DataPath, ...] | None]
+    texts: Mapping[str, Cases | None]
     looked_at: bool = False
 
     def register(self, name: str) -> str:
@@ -663,37 +623,23 @@ def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
             yield ("cast", member, "one_of", 0, "frames", name), frame
 
 
-# -- what differs between the files of a `one_of`, as values that depend on which was drawn ------------------
+# -- values that depend on others ---------------------------------------------------------------------------
 
 
-def drawn(which: Term | None, among: Iterable[int]) -> Term | None:
-    """Whether the file that was drawn, whose number `which` is, is one of these; None if that is certain."""
-    numbers = sorted(set(among))
-    if which is None or len(numbers) == which.type.size:
-        return None
-    return one_of(which, [Const(which.type, number) for number in numbers])
-
-
-def by_value(values: Sequence[V]) -> dict[V, list[int]]:
-    """Value -> the alternatives that have it, in order of appearance."""
-    found: dict[V, list[int]] = {}
-    for number, value in enumerate(values):
-        found.setdefault(value, []).append(number)
-    return found
-
-
-def select(which: Term | None, terms: Sequence[Term]) -> Term:
-    """The value that belongs to the file that was drawn, whose number `which` is."""
+def select(cases: Cases, terms: Sequence[Term]) -> Term:
+    """The term beside the case that holds; each has one."""
     kinds = {term.type.kind for term in terms}
-    assert len(kinds) == 1, "internal: alternatives of different kinds"
-    if len(set(terms)) == 1:
+    assert len(kinds) == 1, "internal: cases of different kinds"
+    drawn = cases[0].drawn
+    if len(set(terms)) == 1 or drawn is None:
         return terms[0]
-    assert which is not None, "internal: nothing is drawn, and the values differ"
+    found = {n: term for case, term in zip(cases, terms, strict=True) for n in case.numbers}
+    each = [found[number] for number in drawn.type.values]
     if kinds == {"text"}:
-        return text_of([(equals(which, number), term) for number, term in enumerate(terms)])
-    type_ = common_type(terms)
-    typed = [replace(term, type=type_) if isinstance(term, Const) else term for term in terms]
-    return _with_default(type_, [(equals(which, number), term) for number, term in enumerate(typed)])
+        return text_of([(equals(drawn, number), term) for number, term in enumerate(each)])
+    type_ = common_type(each)
+    typed = [replace(term, type=type_) if isinstance(term, Const) else term for term in each]
+    return _with_default(type_, [(equals(drawn, number), term) for number, term in enumerate(typed)])
 
 
 def _with_default(type_: Type, cases: Sequence[tuple[Term, Term]]) -> Select:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from typing import Final
@@ -10,9 +10,9 @@ from typing import Final
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
+from socialai_dsl.schema.scenario import Expression, ObjectGroup, Scenario
 from socialai_dsl.semantics import groups, hands, object_facts, tables
-from socialai_dsl.semantics.entities import AGENT
+from socialai_dsl.semantics.cast import AGENT, Case
 from socialai_dsl.semantics.facts import What, entities_of, needs
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
@@ -21,8 +21,6 @@ from socialai_dsl.semantics.scope import (
     Findings,
     Objects,
     Scope,
-    by_value,
-    drawn,
     object_scope,
     quoted,
     reset_scope,
@@ -259,16 +257,15 @@ def _follows_from_size(term: Term) -> bool:
 
 
 def placings(resolver: Resolver) -> dict[int, tuple[Placing, ...]]:
-    """Entity -> where it is put; several, each with its condition, where the files of a `one_of` differ."""
+    """Entity -> where it is put; several, each with its condition, where that has cases."""
     found: dict[int, tuple[Placing, ...]] = {}
-    for name, members in resolver.symbols.alternatives.items():
+    for name, member in resolver.symbols.cast.items():
         with surviving():
-            number = resolver.symbols.numbers[name]
-            keys = [(member.place, member.at) for member in members]
-            found[number] = tuple(
-                replace(_member_placing(resolver, name, members[numbers[0]], numbers[0]), when=when)
-                for numbers, when in _distinct(resolver, name, keys)
-            )
+            for version in member.versions:
+                if {"place", "at"} <= version.keys():
+                    _both_places(resolver, version["at"].path)
+            placings = (_member_placing(resolver, name, case) for case in member.cases("at", "place"))
+            found[resolver.symbols.numbers[name]] = tuple(placings)
     for objects in resolver.symbols.objects.values():
         with surviving():
             for placing in _object_placings(resolver, objects):
@@ -291,27 +288,17 @@ def _check_hands(resolver: Resolver, placed: Mapping[int, tuple[Placing, ...]]) 
         full[holder.value] = number
 
 
-def _distinct(
-    resolver: Resolver, name: str, keys: Sequence[Hashable]
-) -> Iterator[tuple[list[int], Term | None]]:
-    """The alternatives of a member that have the same keys, with the condition that one of them was drawn."""
-    for numbers in by_value(keys).values():
-        yield numbers, drawn(resolver.registers.drawn_file(name), numbers)
-
-
-def _member_placing(resolver: Resolver, name: str, member: CastMember, which: int) -> Placing:
-    key = "at" if member.at is not None else "place"
-    path = resolver.symbols.member_path(name, key, which)
-    spot = Spot(resolver.symbols.numbers[name], path, f"cast.{name}.cell", 0)
-    scope = reset_scope(path, f"cast.{name}.{key}", name)
-    if member.at is not None:
-        if member.place is not None:
-            _both_places(resolver, path)
-        return at(resolver, spot, member.at, scope)
-    placing = place(resolver, spot, member.place or "anywhere", scope)
+def _member_placing(resolver: Resolver, name: str, case: Case) -> Placing:
+    key = case.path[-1]
+    spot = Spot(resolver.symbols.numbers[name], case.path, f"cast.{name}.cell", 0)
+    scope = reset_scope(case.path, f"cast.{name}.{key}", name)
+    if key == "at":
+        placing = at(resolver, spot, case.raw, scope)
+    else:
+        placing = place(resolver, spot, case.raw or "anywhere", scope)
     if placing.nowhere and name == AGENT:
         raise resolver.findings.fail("S204", "the agent has to be somewhere in the room", placing.span)
-    return placing
+    return replace(placing, when=case.when)
 
 
 def _both_places(resolver: Resolver, path: DataPath) -> None:
@@ -383,18 +370,16 @@ def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) ->
 
 def colorings(resolver: Resolver) -> Iterator[Coloring]:
     """The colour of every entity."""
-    for name, members in resolver.symbols.alternatives.items():
+    for name, member in resolver.symbols.cast.items():
         with surviving():
-            for numbers, when in _distinct(resolver, name, [member.color for member in members]):
-                path = resolver.symbols.member_path(name, "color", numbers[0])
-                scope = reset_scope(path, f"cast.{name}.color", name)
-                color = members[numbers[0]].color
-                if color == "distinct":
-                    yield _distinct_color(resolver, name, path)
+            for case in member.cases("color"):
+                if case.raw == "distinct":
+                    yield replace(_distinct_color(resolver, name, case.path), when=case.when)
                     continue
-                value = None if color is None else _color(resolver, color, scope)
-                number = resolver.symbols.numbers[name]
-                yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value, when=when)
+                number, site = resolver.symbols.numbers[name], f"cast.{name}.color"
+                scope, span = reset_scope(case.path, site, name), resolver.findings.at(case.path)
+                value = None if case.raw is None else _color(resolver, case.raw, scope)
+                yield Coloring(number, site, 0, span, value, when=case.when)
     for objects in resolver.symbols.objects.values():
         with surviving():
             yield from _object_colors(resolver, objects, resolver.symbols.scenario.objects[objects.name])
@@ -475,21 +460,19 @@ def _of_group(
 
 def facings(resolver: Resolver) -> Iterator[Facing]:
     """The direction of every member of the cast."""
-    for name, members in resolver.symbols.alternatives.items():
+    for name, member in resolver.symbols.cast.items():
         with surviving():
-            for numbers, when in _distinct(resolver, name, [member.facing for member in members]):
-                facing = _facing(resolver, name, members[numbers[0]], numbers[0])
-                yield replace(facing, when=when)
+            for case in member.cases("facing"):
+                yield replace(_facing(resolver, name, case), when=case.when)
 
 
-def _facing(resolver: Resolver, name: str, member: CastMember, which: int) -> Facing:
-    path = resolver.symbols.member_path(name, "facing", which)
-    span, site = resolver.findings.at(path), f"cast.{name}.facing"
+def _facing(resolver: Resolver, name: str, case: Case) -> Facing:
+    span, site = resolver.findings.at(case.path), f"cast.{name}.facing"
     number = resolver.symbols.numbers[name]
-    if member.facing is None or member.facing == "random":
+    if case.raw is None or case.raw == "random":
         return Facing(number, site, span)
-    scope = reset_scope(path, site, name)
-    node = resolver.findings.expression(path, member.facing)
+    scope = reset_scope(case.path, site, name)
+    node = resolver.findings.expression(case.path, case.raw)
     if isinstance(node, ast.Call) and node.name == "toward" and node.subject is None:
         if len(node.args) != 1:
             raise resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from socialai_dsl.schema.scenario import CastMember
 from socialai_dsl.semantics.scope import FilledSlot, Findings, Symbols, beside_word, surviving
 from socialai_dsl.semantics.terms import COLOR, Const, Term, Type, entity
 from socialai_dsl.source import DataPath
@@ -90,13 +89,13 @@ def _entries(symbols: Symbols, raw: str | int, place: DataPath, findings: Findin
 def name_of(symbols: Symbols, member: str, place: DataPath, findings: Findings) -> str:
     """How others call a member of the cast, which has to be known to all."""
 
-    def called(one: CastMember) -> str | None:
-        if one.name is None:
+    def called(name: object) -> str | None:
+        if name is None:
             return symbols.default_name(member)
-        raw = str(one.name)
+        raw = str(name)
         return raw if is_plain(raw) and raw not in symbols.declared and "(" not in raw else None
 
-    names = {called(one) for one in symbols.alternatives[member]}
+    names = {called(case.raw) for case in symbols.cast[member].cases("name")}
     name = names.pop()
     if names or name is None:
         message = f"the name of `{member}` is drawn, so nobody can be sure to say it"

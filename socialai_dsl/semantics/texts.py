@@ -13,6 +13,7 @@ from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.cast import Case, grouped
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
 from socialai_dsl.semantics.resolver import (
     INT,
@@ -27,9 +28,7 @@ from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
     Scope,
-    by_value,
     described,
-    drawn,
     is_nothing,
     quoted,
     select,
@@ -93,13 +92,13 @@ def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
 
 
 def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None, Span]]:
-    """The texts that an argument names, each with the condition on what `one_of` drew and where it is written."""
+    """The texts that an argument names, each with the condition that it is meant and where it is written."""
     found: list[tuple[ast.Text, Term | None, Span]] = []
     for option in ast.options_of(node):
         slot = text_slot(resolver, option, scope)
         if slot is not None:
             places = resolver.findings.places
-            found += [(one.text, one.drawn, places.whole_span(one.path)) for one in slot]
+            found += [(one.text, one.case.when, places.whole_span(one.case.path)) for one in slot]
         elif isinstance(option, ast.Text):
             found.append((option, None, resolver.findings.node(scope.path, option)))
         else:
@@ -118,8 +117,7 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
 
 def text_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[Filling] | None:
     """What fills the slot of type text or utterance that an expression names, `<formula>` of one's own frame or
-    `<teacher.formula>` of a member's: one text, or several where the files of a `one_of` differ. None if it names
-    no such slot.
+    `<teacher.formula>` of a member's: each text that it can be. None if it names no such slot.
     """
     frame, name = scope.frame, ""
     match node:
@@ -131,19 +129,12 @@ def text_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[Filling]
             return None
     if frame is None or frame.model.slots.get(name) not in ("text", "utterance"):
         return None
-    paths = frame.texts.get(name)
-    if paths is None:
+    cases = frame.texts.get(name)
+    if cases is None:
         raise FailedError  # nobody fills it, which is reported where it is left empty
-    described = resolver.symbols.alternatives[frame.member]
     return [
-        Filling(
-            frame.member,
-            name,
-            paths[numbers[0]],
-            resolver.findings.text(paths[numbers[0]], raw),
-            drawn(resolver.registers.drawn_file(frame.member), numbers),
-        )
-        for raw, numbers in by_value([str(one.with_[name]) for one in described]).items()
+        Filling(frame.member, name, case, resolver.findings.text(case.path, str(case.raw)))
+        for case in grouped(cases)
     ]
 
 
@@ -207,8 +198,8 @@ def _fillings(resolver: Resolver, found: Mapping[str, int | None]) -> tuple[tupl
 def _spliced(
     resolver: Resolver, text: ast.Text, scope: Scope
 ) -> Iterator[tuple[list[str | ast.Expr], list[Term], Span | None]]:
-    """The parts of a text, with texts that fill slots put in their place; all ways to do so, where files that
-    `one_of` draws differ, each with its conditions, and with the place of what fills a text that is one slot.
+    """The parts of a text, with texts that fill slots put in their place; all ways to do so,
+    each with its conditions, and with the place of what fills a text that is one slot.
     """
     choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None, Span | None]]] = []
     findings = resolver.findings
@@ -219,7 +210,10 @@ def _spliced(
             continue
         alone = len(text.parts) == 1
         choices.append(
-            [(f.text.parts, f.drawn, findings.places.whole_span(f.path) if alone else None) for f in slot]
+            [
+                (f.text.parts, f.case.when, findings.places.whole_span(f.case.path) if alone else None)
+                for f in slot
+            ]
         )
     for choice in product(*choices):
         parts = [part for parts, _, _ in choice for part in parts]
@@ -370,7 +364,7 @@ def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
 
 
 def _filled(resolver: Resolver, slot: list[Filling], scope: Scope) -> list[str | Term]:
-    """What a slot contributes to a line; where files that `one_of` draws differ, one value with their texts."""
+    """What a slot contributes to a line; of several texts, one value that is one of them."""
     if len(slot) == 1:
         return parts(resolver, slot[0].text, slot[0].scope(scope))
     values = next((filling for filling in slot if filling.text.plain is None), None)
@@ -379,17 +373,15 @@ def _filled(resolver: Resolver, slot: list[Filling], scope: Scope) -> list[str |
         raise resolver.findings.fail(
             "S315",
             message,
-            resolver.findings.at(values.path),
+            resolver.findings.at(values.case.path),
             hint="put what differs into a slot of its own",
         )
-    return [plain_text(resolver, slot)]
+    return [plain_text(slot)]
 
 
-def plain_text(resolver: Resolver, slot: list[Filling]) -> Term:
-    """What fills a slot without values in it: the text of the file that was drawn."""
-    member, name = slot[0].member, slot[0].slot
-    texts_ = [text_value(str(one.with_[name])) for one in resolver.symbols.alternatives[member]]
-    return select(resolver.registers.drawn_file(member), texts_)
+def plain_text(slot: list[Filling]) -> Term:
+    """What fills a slot without values in it."""
+    return select(tuple(one.case for one in slot), [text_value(str(one.case.raw)) for one in slot])
 
 
 def _agents(resolver: Resolver, line: Line) -> Line:
@@ -428,18 +420,17 @@ def _may_change(resolver: Resolver, value: Term) -> bool:
 
 @dataclass(frozen=True)
 class Filling:
-    """A text that fills a slot of a member's frame; `drawn` is the condition that it is this one of several."""
+    """A text that can fill a slot of a member's frame."""
 
     member: str
     slot: str
-    path: DataPath
+    case: Case
     text: ast.Text
-    drawn: Term | None
 
     def scope(self, user: Scope) -> Scope:
         """The meaning of its names at its place."""
         draws = Draws(f"cast.{self.member}.with.{self.slot}")
-        return Scope(self.path, draws, member=self.member, outer=user.draws)
+        return Scope(self.case.path, draws, member=self.member, outer=user.draws)
 
 
 def _varies(part: str | Term) -> TypeGuard[Term]:

@@ -7,7 +7,7 @@ from typing import Final
 from socialai_dsl.semantics import hands, object_facts
 from socialai_dsl.semantics.groups import check_points
 from socialai_dsl.semantics.resolver import Resolver, text_value
-from socialai_dsl.semantics.scope import of_each
+from socialai_dsl.semantics.scope import of_each, select
 from socialai_dsl.semantics.terms import (
     BOOL,
     CELL,
@@ -92,16 +92,17 @@ def _name(use: Use) -> Term:
 
 def _kind(use: Use) -> Term:
     who = use.about()
-    return of_each(who, [text_value(_kind_of(use.resolver, each)) for each in numbers_of(who)])
+    return of_each(who, [_kind_of(use.resolver, each) for each in numbers_of(who)])
 
 
-def _kind_of(resolver: Resolver, entity: int) -> str:
+def _kind_of(resolver: Resolver, entity: int) -> Term:
     objects = resolver.symbols.object_of(entity)
     if objects is not None:
-        return objects.type.name
+        return text_value(objects.type.name)
     member = resolver.symbols.member_of(entity)
     assert member is not None, "internal: an entity is an object or in the cast"
-    return resolver.symbols.cast[member].kind or "peer"
+    cases = resolver.symbols.cast[member].cases("kind")
+    return select(cases, [text_value(case.raw or "peer") for case in cases])
 
 
 def _index(use: Use) -> Term:

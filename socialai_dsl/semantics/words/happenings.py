@@ -150,7 +150,7 @@ def _in_state(use: Use, member: str | None, called: str | None) -> Term:
         raise _nobody(use)
     own = use.scope.frame if called is None else None
     frame = own or use.resolver.frames.get(member)
-    if frame is None and use.resolver.symbols.cast[member].frame is not None:
+    if frame is None and use.resolver.symbols.cast[member].value("frame") is not None:
         raise FailedError  # an unknown frame is reported where it is named
     if frame is None:
         raise use.fail("S310", f"`{called or member}` follows no frame, so it has no states")

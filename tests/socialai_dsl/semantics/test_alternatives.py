@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from socialai_dsl.schema.scenario import CastMember
 from socialai_dsl.semantics.plans import Drawn
 
 BASE = """
@@ -53,6 +54,38 @@ def drawn(checked):
     return {item.path: item.value for item in checked.setup if isinstance(item, Drawn)}
 
 
+def test_each_key_of_a_member_has_cases_or_is_the_same_in_all_files(mistakes, files):
+    values = {
+        "kind": "shy", "name": "Pip", "color": "blue", "place": "top_half", "at": "[1, 1]", "facing": "left",
+        "view": 5, "earshot": "room", "beliefs": "{d: {of: exit.color}}", "accepts": "agent.spoke",
+        "audible": "always", "kind_code": 9,
+    }  # fmt: skip
+    elsewhere = {"role", "frame", "with", "one_of"}
+    fields = CastMember.model_fields
+    assert {fields[name].alias or name for name in fields} == {*values, *elsewhere}
+    differ = set()
+    for key, value in values.items():
+        found = mistakes(**files(ONE, ONE.replace("one", "two") + f"{key}: {value}\n"))
+        if found == [f"S315 what is drawn by `one_of` has one and the same `{key}`"]:
+            differ.add(key)
+        else:
+            assert found == [], key
+    assert differ == {"view", "earshot", "beliefs", "accepts", "audible"}
+
+
+def test_a_name_that_is_left_out_in_one_file_leaves_that_of_another_an_expression(meaning, files):
+    checked = meaning(**files(ONE, ONE.replace("one", "two") + "name: pick(Sue | Sam)\n"))
+    assert set(drawn(checked)["guide.name"].term.type.words) == {"Guide", "Sue", "Sam"}
+
+
+def test_a_frame_that_nobody_gives_has_no_slots(mistakes, files):
+    alone = "npc: N\nwith: {near: true}\n"
+    assert mistakes(**files(*(alone.replace("N", name) for name in ("one", "two")))) == [
+        "S303 `one` follows no frame, so it has no slot `near`",
+        "S303 `two` follows no frame, so it has no slot `near`",
+    ]
+
+
 @pytest.mark.parametrize(
     ("other", "said"),
     [
@@ -63,6 +96,9 @@ def drawn(checked):
          "S315 `two` follows no frame, `one` follows the frame `teach`; what is drawn by `one_of` shares one"),
         ("npc: two\nframe: teach\nframes: {teach: {steps: [{say: Hi}]}}\n",
          "S315 `two` and `one` follow different frames; what is drawn by `one_of` shares one"),
+        (TWO + "accepts: agent.spoke\n", "S315 what is drawn by `one_of` has one and the same `accepts`"),
+        (TWO + "beliefs: {door: {of: exit.color}}\n",
+         "S315 what is drawn by `one_of` has one and the same `beliefs`"),
         (TWO.replace("two", "one"), "S213 `one` is the name of another of these files"),
         (TWO.replace("steps", "stepps"), "S303 frame `teach` has no slot `stepps`; did you mean `steps`?"),
         (TWO.replace("goal: pick(doors), ", ""),
@@ -85,3 +121,9 @@ def test_there_is_room_for_what_a_frame_of_a_file_counts(meaning, files):
     checked = meaning(**files(counting.replace("N", "one"), counting.replace("N", "two")))
     (counter,) = [item for item in checked.setup if isinstance(item, Drawn) and item.path == "guide.n"]
     assert counter.type.high >= checked.horizon
+
+
+def test_a_name_that_reads_as_another_is_shown_in_its_file(examine, files):
+    named = TWO.replace("name: Tim", "name: '\"Tim: Bo\"'")
+    (found,) = examine(**files(ONE, named)).diagnostics
+    assert (found.code, found.span.file.rsplit("/", 1)[-1], found.span.line) == ("S405", "npc_1.yaml", 5)
