@@ -93,9 +93,7 @@ def test_a_number_that_cannot_be_is_refused_by_name(command: str, option: str, c
 )
 def test_no_option_of_the_trainer_takes_what_is_no_value(value: str, capsys: Capture) -> None:
     for name in HYPER:
-        refused(
-            ["run", "corridor.yaml", "--hyper", f"{name}={value}", "--out", "run"], f"--hyper {name}", capsys
-        )
+        refused(["run", "dance", "--hyper", f"{name}={value}", "--out", "run"], f"--hyper {name}", capsys)
 
 
 @pytest.mark.parametrize(
