@@ -8,11 +8,7 @@ import pytest
 
 import socialai_dsl as sd
 from tests.scenarios.playing import (
-    CLOSED,
-    DOOR,
     EMPTY,
-    GREY_WALL,
-    NPC,
     Episode,
     beside,
     check_shares,
@@ -121,11 +117,6 @@ class TestEnd:
         step = apart(4, 4).act(body)
         assert (step.ended, step.reward) == ("failure" if body in ("toggle", "done") else None, 0)
 
-    def test_time_alone_truncates(self) -> None:
-        play = apart(4, 4)
-        ends = [play.act().ended for _ in range(100)]
-        assert ends == [None] * 99 + ["timeout"]
-
     def test_a_success_in_the_last_step_is_paid(self) -> None:
         play = apart(3, 6)
         play.acts(*[None] * 99)
@@ -134,20 +125,6 @@ class TestEnd:
 
 
 class TestPerception:
-    def test_the_picture(self) -> None:
-        play = apart(2, 3, "up")
-        assert play.image.shape == (7, 7, 4)
-        assert play.seen((2, 3)) == EMPTY
-        assert play.seen((1, 1))[0] == NPC
-        assert play.seen((3, 0)) == (DOOR, 0, CLOSED, 0)
-        assert play.seen((2, 0)) == GREY_WALL
-
-    def test_beyond_a_small_room_it_is_empty_up_to_the_canvas(self) -> None:
-        layout = {"room": {"width": 5, "height": 5}, "agent": {"at": [3, 3], "facing": "right"}}
-        play = Episode("talkitout", layout)
-        assert [play.seen((x, 3)) for x in (5, 6, 7)] == [EMPTY] * 3
-        assert play.seen((8, 3)) == GREY_WALL
-
     def test_visible_npcs_are_in_the_way_and_hidden_ones_silent_unseen_and_passable(self) -> None:
         play = apart(2, 1, "left")
         play.act("forward")
