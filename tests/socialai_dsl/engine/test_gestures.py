@@ -1,4 +1,4 @@
-"""Gestures in the pictures of batches: of several programs, at the end of an episode, in digests."""
+"""In a batch of several programs each shows the gestures that it declares."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.calls import Task
 from socialai_dsl.program import CELL, LAST_ACTS, NO_GESTURE, Op, Register
 from tests.assembly import (
     Assembly,
@@ -50,30 +49,3 @@ def test_a_direction_is_no_cell_and_a_program_shows_what_it_declares() -> None:
     step(batch)
     rows = batch.state.extra.view(np.uint8)[:, : 4 * 49].reshape(3, 49, 4)[:, AHEAD].tolist()
     assert rows == [2 * NOTHING, [3, 7, *NOTHING], [3, 7, 127, 129]]
-
-
-def test_programs_with_four_channels_have_no_more() -> None:
-    plain = Assembly(at=((1, 2), (2, 2)), npcs=1).program()
-    assert batch_of(plain).state.extra.shape == (1, 0)
-    rich = Assembly(at=((1, 2), (2, 2)), npcs=1, channels=6).program()
-    both = Batch([part_of(plain), part_of(rich)], [[0], [1]], [0, 1], 8)
-    both.state.extra[:] = 7
-    both.reset()
-    assert (both.state.extra[0] == 0xFFFF).all()
-    assert both.state.extra[1, AHEAD] == LAST_ACTS["none"] << 8 | NO_GESTURE
-
-
-def test_pictures_that_differ_in_a_gesture_have_different_digests() -> None:
-    batch = performing((Op.POINT, constant(1), constant(2)))
-    before, image = batch.identify(), batch.state.image.copy()
-    step(batch)
-    assert np.array_equal(batch.state.image, image)
-    assert batch.identify() != before
-
-
-def test_the_last_gestures_of_an_episode_are_kept() -> None:
-    batch = performing((Op.POINT, constant(1), constant(2)), horizon=1)
-    batch.ports.actions[:] = (7, 0, 0, 0)
-    assert batch.step(Task.STEP_SAME) == 1
-    assert batch.ports.final_extra[0, AHEAD] == (LAST_ACTS["point"] + 2) << 8 | 2
-    assert batch.state.extra[0, AHEAD] == LAST_ACTS["none"] << 8 | NO_GESTURE

@@ -1,4 +1,4 @@
-"""Results depend on nothing but keys and actions: not on batch size, order, or how resets come about."""
+"""What a batch does that no environment shows: rows that wait, actions that a program lacks, the size of its state."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.state import Key
-from socialai_dsl.program import Body, Field, Header, Op, Program, Register
+from socialai_dsl.program import Body, Field, Op, Program, Register
 from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, part_of, temporary
 
 
@@ -104,70 +102,6 @@ def record(batch: Batch, played: NDArray[np.int64], task: Task) -> dict[str, NDA
     return {name: np.stack(arrays) for name, arrays in shown.items()}
 
 
-@pytest.mark.parametrize("task", [Task.STEP_NEXT, Task.STEP_SAME])
-def test_batch_size_changes_nothing(task: Task) -> None:
-    program = lively()
-    steps = actions(4096, 25)
-    whole = record(batch_of(program, 4096), steps, task)
-    seven = record(batch_of(program, 7), steps[:, :7], task)
-    one = record(batch_of(program, 1), steps[:, :1], task)
-    for name, expected in whole.items():
-        np.testing.assert_array_equal(seven[name], expected[:, :7], err_msg=name)
-        np.testing.assert_array_equal(one[name], expected[:, :1], err_msg=name)
-    assert len(np.unique(whole["outcome"])) == 5, "every way to end occurred, and none"
-
-
-def test_every_end_is_counted_once() -> None:
-    batch = batch_of(lively(), 512)
-    record(batch, actions(512, 25), Task.STEP_NEXT)
-    totals = batch.counters.tolist()
-    assert totals[-1] == sum(totals[1:-1]), "every episode ended in one way"
-    assert min(totals) > 0
-
-
-def test_next_step_mode_is_a_row_reset_by_hand_one_step_later() -> None:
-    program = lively()
-    steps = actions(40, 40)
-    automatic = record(batch_of(program, 40), steps, Task.STEP_NEXT)
-    batch = batch_of(program, 40)
-    for t, step in enumerate(steps):
-        over = batch.state.registers[:, Register.ENDED] != 0
-        batch.ports.actions[:] = step
-        batch.step(Task.STEP_ONLY)
-        if over.any():
-            batch.state.keys[over, Key.EPISODE] += np.uint64(1)
-            batch.ports.chosen[:] = over
-            batch.reset()
-        np.testing.assert_array_equal(batch.state.image, automatic["image"][t])
-        np.testing.assert_array_equal(batch.state.tokens, automatic["tokens"][t])
-        np.testing.assert_array_equal(batch.ports.reward, automatic["reward"][t])
-        np.testing.assert_array_equal(batch.ports.outcome, automatic["outcome"][t])
-        assert not automatic["terminated"][t, over].any()
-        assert not automatic["truncated"][t, over].any()
-
-
-def test_same_step_mode_keeps_the_last_observation() -> None:
-    program = lively()
-    steps = actions(40, 40)
-    same, single = batch_of(program, 40), batch_of(program, 40)
-    finals = 0
-    for step in steps:
-        for batch, task in ((same, Task.STEP_SAME), (single, Task.STEP_ONLY)):
-            batch.ports.actions[:] = step
-            batch.step(task)
-        ended = single.state.registers[:, Register.ENDED] != 0
-        finals += ended.sum()
-        np.testing.assert_array_equal(same.ports.final_image[ended], single.state.image[ended])
-        np.testing.assert_array_equal(same.ports.final_tokens[ended], single.state.tokens[ended])
-        np.testing.assert_array_equal(same.ports.outcome, single.ports.outcome)
-        single.state.keys[ended, Key.EPISODE] += np.uint64(1)
-        single.ports.chosen[:] = ended
-        single.reset()
-        np.testing.assert_array_equal(same.state.image, single.state.image)
-        np.testing.assert_array_equal(same.state.tokens, single.state.tokens)
-    assert finals > 100
-
-
 def test_ended_rows_wait_where_resets_are_the_callers() -> None:
     batch = batch_of(lively(horizon=2), 20)
     record(batch, actions(20, 2), Task.STEP_ONLY)
@@ -175,49 +109,6 @@ def test_ended_rows_wait_where_resets_are_the_callers() -> None:
     record(batch, actions(20, 3), Task.STEP_ONLY)
     np.testing.assert_array_equal(batch.state.registers, before)
     assert not batch.ports.terminated.any()
-
-
-def mixed(programs: list[Program], pools: list[list[int]], pool_of_row: list[int]) -> Batch:
-    parts = [part_of(program, 4 * i) for i, program in enumerate(programs)]
-    length = max(program.header(Header.TOKENS) for program in programs)
-    batch = Batch(parts, pools, pool_of_row, length)
-    batch.state.keys[:, Key.SEED] = 7
-    batch.state.keys[:, Key.INDEX] = np.arange(len(pool_of_row))
-    batch.reset()
-    return batch
-
-
-def test_programs_side_by_side_play_as_they_do_alone() -> None:
-    programs = [lively(6), Assembly(at=((2, 2),), tokens=16, horizon=4).program(), lively(9)]
-    steps = actions(30, 30)
-    together = record(mixed(programs, [[0], [1], [2]], [i % 3 for i in range(30)]), steps, Task.STEP_NEXT)
-    for number, program in enumerate(programs):
-        rows = np.arange(30) % 3 == number
-        alone = record(batch_of(program, 30), steps, Task.STEP_NEXT)
-        for name in ("image", "reward", "terminated", "truncated"):
-            np.testing.assert_array_equal(
-                together[name][:, rows], alone[name][:, rows], err_msg=f"{number} {name}"
-            )
-        length = alone["tokens"].shape[2]
-        np.testing.assert_array_equal(together["tokens"][:, rows, :length], alone["tokens"][:, rows])
-        outcome = alone["outcome"][:, rows]
-        np.testing.assert_array_equal(
-            together["outcome"][:, rows], np.where(outcome >= 0, outcome + 4 * number, -1)
-        )
-
-
-def test_a_pool_draws_its_program_anew_in_every_episode() -> None:
-    programs = [lively(6), Assembly(at=((2, 2),), tokens=16, horizon=4).program(), lively(9)]
-    batch = mixed(programs, [[0, 1, 2]], [0] * 300)
-    first = batch.program_numbers()
-    assert np.bincount(first).min() > 60
-    alone = [batch_of(program, 300) for program in programs]
-    for number in range(3):
-        rows = first == number
-        np.testing.assert_array_equal(batch.state.image[rows], alone[number].state.image[rows])
-    batch.state.keys[:, Key.EPISODE] += np.uint64(1)
-    batch.reset()
-    assert (batch.program_numbers() != first).mean() == pytest.approx(2 / 3, abs=0.12)
 
 
 def test_actions_of_a_larger_space_that_a_program_lacks() -> None:
