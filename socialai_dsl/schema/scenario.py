@@ -389,7 +389,6 @@ class Belief(Model):
 class Character(Model):
     """An inhabitant of the room: its appearance, place and behaviour."""
 
-    role: RoleName | None = Field(None, description="the part it plays")
     kind: Annotated[Word, Holds("spelt")] | None = Field(None, description="its appearance; default peer")
     name: SpeakerName | None = Field(
         None, description="the speaker's name before its lines; default its key, capitalised"
@@ -427,10 +426,11 @@ class Npc(Character):
 
 
 class CastMember(Character):
-    """The agent or an NPC. Keys left out come from its role, from the file that `one_of` draws, from `npc_defaults`,
+    """The agent or an NPC. Keys left out come from the file that `one_of` draws, from its role, from `npc_defaults`,
     then from the defaults of the language.
     """
 
+    role: RoleName | None = Field(None, description="the part it plays")
     one_of: Annotated[
         tuple[Npc, ...] | None,
         BeforeValidator(_as_tuple),
