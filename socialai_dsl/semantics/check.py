@@ -317,7 +317,7 @@ def check_meaning(
     """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
 
     Types that follow from uses (`pick(left | right)`, registers that are set) are found by resolving again with
-    what the uses asked for, until nothing changes.
+    what the uses asked for, until nothing changes; for ranges of registers that is seldom more than once.
 
     Args:
         scenario: the models.
@@ -330,7 +330,7 @@ def check_meaning(
             nor a rival that plays.
     """
     words: dict[str, Type] = {}
-    ranges = Ranges(scenario)
+    ranges = Ranges(scenario.horizon)
     checked: CheckedScenario | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
@@ -345,9 +345,7 @@ def check_meaning(
         words = registers.words
         if registers.learned:
             continue
-        if found.has_errors or (
-            ranges.settled(registers.ranges, registers.sources, registers.copies) and settled
-        ):
+        if found.has_errors or (ranges.settle(registers) and settled):
             run.report_too_far(ranges.too_far)
             run.report_heard(checked is not None)
             if checked is not None:

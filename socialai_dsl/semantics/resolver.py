@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import islice, product
 from math import prod
 from typing import ClassVar, Final, Unpack
@@ -225,9 +225,7 @@ class Registers:
         words: types that uses settled for registers whose value is bare words, such as `pick(left | right)`, or that
             start with nothing.
         learned: whether it was found only now what some register holds that starts with nothing.
-        ranges: for registers that are set, the range they were found to need.
-        sources: for these, the registers that the values they are set to follow from.
-        copies: for these, the registers whose values they are set to as they are.
+        set_to: the values that registers are set to, of those that have room for whatever that is.
         remembered: what is computed at the start of every step, for `prev`.
     """
 
@@ -243,9 +241,8 @@ class Registers:
         self.words = dict(words)
         self.learned = False
         self._given_ranges = dict(ranges)
-        self.ranges: dict[str, Type] = {}
-        self.sources: dict[str, set[str]] = {}
-        self.copies: dict[str, set[str]] = {}
+        self.set_to: dict[str, list[Term]] = {}
+        self._noted: dict[str, list[Term]] = {}
 
     def __len__(self) -> int:
         """How many registers are declared or hold a known value."""
@@ -273,7 +270,7 @@ class Registers:
         if known is None:
             known = Drawn(f"{NOTED}{len(self.remembered)}", value.term.type, value)
             self.remembered.append(known)
-            self.sources[known.path] = _registers_in(value.term)
+            self._noted.setdefault(known.path, []).append(value.term)
         return Read(known.type, known.path, may_miss=may_find_nothing(value.term))
 
     @contextmanager
@@ -388,23 +385,30 @@ class Registers:
     def widen(self, path: str, value: Term) -> None:
         """Make room in a register for a value it is set to; one with a range of its own keeps to it."""
         declaration, type_ = self._declared[path], value.type
-        self.sources.setdefault(path, set()).update(_registers_in(value))
-        if isinstance(value, Read):
-            self.copies.setdefault(path, set()).add(value.path)
-        if declaration.starts_with_nothing and declaration.range is None and path not in self.words:
+        if declaration.range is not None:
+            return
+        if declaration.starts_with_nothing and path not in self.words:
             self.words[path] = type_
             self.learned = True
-        counted = type_.kind == "int" and not type_.words
-        if declaration.range is None and (counted or type_.kind == "entity"):
-            own = self.ranges.get(path) or self._started(path) or type_
-            self.ranges[path] = _union(own, type_)
+        if _counts(type_):
+            self.set_to.setdefault(path, []).append(value)
 
-    def _started(self, path: str) -> Type | None:
-        """The type of all that a register starts with; None if that is nothing."""
-        if self._declared[path].starts_with_nothing:
-            return None
-        found = [drawn.value.term.type for drawn in self._drawn.get(path, ())]
-        return reduce(_union, found) if found else None
+    def values_of(self, path: str) -> list[Term]:
+        """All that a register may hold: what it starts with, is set to, or notes for `prev`, be it `apart`.
+
+        Empty where it has a range of its own.
+        """
+        declaration = self._declared.get(path)
+        if declaration is not None and declaration.range is not None:
+            return []
+        starts = declaration is None or not declaration.starts_with_nothing
+        drawn = [one.value.term for one in self._drawn.get(path, ()) if starts]
+        return [*drawn, *self._noted.get(path, ()), *self.set_to.get(path, ())]
+
+    def type_of(self, path: str) -> Type | None:
+        """The type that a register has been resolved with; None if it means nothing."""
+        term = self._terms.get(path)
+        return term.type if term is not None else None
 
     def _resolve(self, declaration: Declaration) -> None:
         path = declaration.path
@@ -419,9 +423,8 @@ class Registers:
             self._terms[path] = first.term
             return
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
-        may_widen = type_.kind == "entity" or (type_.kind == "int" and not type_.words)
-        if path in self._given_ranges and may_widen:
-            type_ = _union(type_, self._given_ranges[path])
+        if path in self._given_ranges and _counts(type_):
+            type_ = union(type_, self._given_ranges[path])
         empties = declaration.starts_with_nothing or declaration.forgets
         nothing = nothing_of(type_) if empties else None
         self._terms[path] = Read(type_, path, nothing)
@@ -463,7 +466,7 @@ class Registers:
                 findings = self._resolver.findings
                 message = f"`{declaration.label}` starts with values of different kinds"
                 raise findings.fail("S204", message, findings.at(declaration.source))
-            type_ = _union(type_, other)
+            type_ = union(type_, other)
         return type_
 
     def _within_range(self, declaration: Declaration, term: Term) -> Type:
@@ -494,12 +497,13 @@ class Registers:
         return findings.fail("S208", needs, findings.places.key_span(circle[0].source))
 
 
-def _registers_in(term: Term) -> set[str]:
-    """The registers that a term reads; those of a group are one."""
-    return {part.path.partition("(")[0] for part in walk(term) if isinstance(part, Read)}
+def _counts(type_: Type) -> bool:
+    """Whether values are numbers, or things, of which a register may need a wider range."""
+    return type_.kind == "entity" or (type_.kind == "int" and not type_.words)
 
 
-def _union(a: Type, b: Type) -> Type:
+def union(a: Type, b: Type) -> Type:
+    """The first type with room for the values of another of its kind."""
     return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))
 
 

@@ -610,7 +610,7 @@ def arithmetic(op: Any, *args: Term) -> Term:
     """An operation on numbers with the range of its result; known values are computed."""
     if all(isinstance(arg, Const) for arg in args):
         return number(compute(op, *(arg.value for arg in args if isinstance(arg, Const))))
-    return Operation(_range(op, *(arg.type for arg in args)), op, args)
+    return Operation(range_of(op, *(arg.type for arg in args)), op, args)
 
 
 COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {"==": eq, "!=": ne, "<": lt, "<=": le}
@@ -633,7 +633,8 @@ def compute(op: str, *values: int) -> int:
     return _OF_ONE[op](*values) if op in _OF_ONE else reduce(_OF_TWO[op], values)
 
 
-def _range(op: str, *types: Type) -> Type:
+def range_of(op: str, *types: Type) -> Type:
+    """The range of the result of an operation on numbers of some ranges."""
     a, b = types[0], types[-1]
     if op == "%":
         low, high = (0, b.high - 1) if b.low > 0 else (b.low + 1, 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from socialai_dsl.semantics import check
 from socialai_dsl.semantics.plans import Drawn
 
 
@@ -82,6 +83,70 @@ def test_rules_of_the_world_set_only_what_the_world_has(examine, name, message):
     (found,) = examine(**sections, rules=[{"when": "t > 3", "set": {name: 1}}]).diagnostics
     assert found.message == message
     assert (found.suggestion == "price") == (name == "prize")
+
+
+RING = 20
+FOLLOWING = {
+    "a counter": ({"n": 0}, ["n: n + 1"], {"n": (0, 20)}),
+    "one of two rules": ({"n": 0}, ["n: n + 1", "n: n - 2"], {"n": (-80, 40)}),
+    "a bound": ({"n": 0}, ["n: min(n + 1, 300)", "n: 0"], {"n": (0, 40)}),
+    "two that take turns": ({"a": 0, "b": 0}, ["a: b + 1", "b: max(a, 3)"], {"a": (0, 23), "b": (0, 22)}),
+    "what follows from a counter": (
+        {"n": 0, "m": 0, "far": 0},
+        ["n: n + 1", "m: max(m, n - 15)", "far: n * 3"],
+        {"n": (0, 20), "m": (0, 5), "far": (0, 60)},
+    ),
+    "a sum of a counter": ({"n": 0, "m": 0}, ["n: n + m", "m: m + 1"], {"n": (0, 400), "m": (0, 20)}),
+    "a double": ({"n": 1}, ["n: n * 2"], {"n": (1, 2**20)}),
+    "what was before": ({"n": 0, "m": 0}, ["n: n + 1", "m: prev(n) + 1"], {"n": (0, 20), "m": (0, 21)}),
+    "a ring": (
+        {f"r{k}": 0 for k in range(RING)},
+        ["r0: min(r19 + 1, 5)", *(f"r{k}: r{k - 1} + 0" for k in range(1, RING))],
+        {f"r{k}": (0, 5) for k in range(RING)},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FOLLOWING)
+def test_a_range_has_room_for_an_episode_and_no_more(meaning, case):
+    state, sets, expected = FOLLOWING[case]
+    rules = [{"when": "t > 0", "set": dict([text.split(": ")])} for text in sets]
+    checked = meaning(state=state, rules=rules)
+    assert checked.horizon == 20
+    assert {name: register(checked, f"state.{name}") for name in expected} == expected
+
+
+def test_what_grows_throughout_a_long_episode(meaning):
+    rules = [{"when": "t > 0", "set": {"n": "n + 1", "m": "min(m + 2, 700)"}}]
+    checked = meaning(horizon=1000, state={"n": 0, "m": 0}, rules=rules)
+    assert 1000 <= register(checked, "state.n")[1] <= 1064
+    assert register(checked, "state.m") == (0, 700)
+
+
+def test_there_is_room_for_what_a_belief_comes_to(meaning):
+    beliefs = {"now": {"of": "t", "start": 0}, "later": {"of": "guide.believes.now + 1", "start": 0}}
+    checked = meaning(cast={"guide": {"beliefs": beliefs}})
+    assert register(checked, "guide.believes.now") == (0, 20)
+    assert register(checked, "guide.believes.later") == (0, 21)
+
+
+@pytest.mark.parametrize(("start", "rounds"), [(0, 2), ({"start": 0, "range": "0..9"}, 1), ("pick(0..9)", 1)])
+def test_a_scenario_is_resolved_again_only_where_a_range_is_wider(meaning, monkeypatch, start, rounds):
+    count = 0
+
+    class Counted(check._Run):
+        def checked(self, name):
+            nonlocal count
+            count += 1
+            return super().checked(name)
+
+    monkeypatch.setattr(check, "_Run", Counted)
+    said = {"set": {"price": "min(price + 1, 9)"}, "say": "It is <price>"}
+    frames = {"count": {"states": {"s": {"then": [said]}}}}
+    checked = meaning(state={"price": start}, frames=frames, cast={"guide": {"frame": "count"}})
+    assert count == rounds
+    assert register(checked, "state.price") == (0, 9)
+    assert "9" in checked.words_in_order
 
 
 # -- rewards --------------------------------------------------------------------------------------------------------
