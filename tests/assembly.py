@@ -20,7 +20,6 @@ from socialai_dsl.program import (
     EntityColumn,
     EntityName,
     Field,
-    Flag,
     FrameColumn,
     Header,
     Op,
@@ -347,9 +346,6 @@ class Assembly:
             rows += [first, len(tokens), heard, -1]
             first += len(tokens)
         return rows
-
-
-HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
 def part_of(program: Program, first_outcome: int = 0) -> LinkedProgram:
