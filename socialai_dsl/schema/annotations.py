@@ -21,7 +21,7 @@ from socialai_dsl.schema.experiment import (
     Transfer,
 )
 from socialai_dsl.schema.files import FILES, TestsFile
-from socialai_dsl.schema.holds import TEXTS, Hides, Holds, Kind, branches, said_of
+from socialai_dsl.schema.holds import TEXTS, Hides, Holds, Kind, Means, branches, said_of
 from socialai_dsl.schema.scenario import (
     Belief,
     CastMember,
@@ -244,6 +244,13 @@ def _patched(path: str) -> Any:
     steps = tuple(0 if step.startswith("[") else step for step in _STEP.findall(path))
     found = (annotation_at(model, steps) for model in (Scenario, Suite))
     return next((annotation for annotation in found if annotation is not Any), Any)
+
+
+@cache
+def conditions_of(model: type[BaseModel]) -> dict[str, Means]:
+    """The keys of a kind of rule that say in the language what they ask for."""
+    said = {key: said_of(annotation, Means) for key, annotation in fields_of(model).items()}
+    return {key: means for key, means in said.items() if means is not None}
 
 
 def may_hide(model: type[BaseModel], path: DataPath) -> bool:

@@ -73,6 +73,13 @@ _ALONE = frozenset[Kind](
 
 
 @dataclass(frozen=True)
+class Means:
+    """What a key of a rule asks for: a condition in the language, in which the key stands for its value, a number."""
+
+    condition: str
+
+
+@dataclass(frozen=True)
 class Hides:
     """Whether a mistake in a value may make other parts look wrong, where its kind says something else."""
 

@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic.config import JsonDict
 
-from socialai_dsl.schema.holds import Hides, Holds
+from socialai_dsl.schema.holds import Hides, Holds, Means
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
@@ -202,7 +202,7 @@ class Rule(Effects):
     )
     addressed: bool | None = Field(None, description="of `hears`: only what is said to it, or only the rest")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
-    after: Annotated[Expression | None, Hides(False)] = Field(
+    after: Annotated[Expression | None, Hides(False), Means("turns_in_state >= after")] = Field(
         None, description="holds from this turn in the state on"
     )
     chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")

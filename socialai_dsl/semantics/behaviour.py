@@ -9,7 +9,9 @@ from typing import Any, cast
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.annotations import keys_of
+from socialai_dsl.grammar.ast import parse_expression
+from socialai_dsl.schema.annotations import conditions_of, keys_of
+from socialai_dsl.schema.holds import Means
 from socialai_dsl.schema.scenario import DOES, Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import abilities, addressing, groups, rows, texts, those
 from socialai_dsl.semantics.cast import AGENT
@@ -356,14 +358,18 @@ class _Planner:
         if compared:
             span = self.resolver.findings.at((*path, "hears"))
             when = on_hearing(heard, when, f"{self.played.member}/{address}.when", span)
-        after, when = self._after(rule, path, when, address)
+        after = self._after(rule, path, address)
+        for key, means in conditions_of(type(rule)).items():
+            if getattr(rule, key) is not None and (key != "after" or after is None):
+                with surviving():
+                    when = self._also(means, (*path, key), getattr(rule, key), when, address)
         plan = RulePlan(
             name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
             site=f"{self.played.member}/{address}",
             span=self.resolver.findings.places.value_span(path),
             hears=() if compared else patterns,
             when=when,
-            after=after,
+            after=after or 0,
             chance=rule.chance,
             once=rule.once,
             do=doing,
@@ -390,30 +396,45 @@ class _Planner:
             return addressing.only(self.resolver, found, rule, path)
         return found
 
-    def _after(
-        self, rule: Rule, path: DataPath, when: SitedTerm | None, address: str
-    ) -> tuple[int, SitedTerm | None]:
-        """From which turn on a rule holds; a number that is drawn becomes a condition on the clock."""
+    def _after(self, rule: Rule, path: DataPath, address: str) -> int | None:
+        """From which turn on a rule holds, if that is known; it is then asked before anything else."""
         place = (*path, "after")
         if rule.after is None:
-            return 0, when
+            return None
         resolver = self.resolver
         term: Term = Const(INT, 0)
         with surviving():
             term = resolver.written(rule.after, INT, self._scope(place, f"{address}.after"))
-        if isinstance(term, Const):
-            if term.value < 0:
-                resolver.findings.error(
-                    "S106", "`after` is a number of turns, at least 0", resolver.findings.at(place)
-                )
-            elif term.value > LARGEST_NUMBER:
-                resolver.findings.too_large("`after`", term.value, resolver.findings.at(place))
-            return max(0, term.value), when
-        clock = Read(Type("int", 0, resolver.symbols.scenario.horizon), f"{self.played.member}.clock")
-        late = Compare("<=", term, clock)
+        if not isinstance(term, Const):
+            return None
+        if term.value < 0:
+            resolver.findings.error(
+                "S106", "`after` is a number of turns, at least 0", resolver.findings.at(place)
+            )
+        elif term.value > LARGEST_NUMBER:
+            resolver.findings.too_large("`after`", term.value, resolver.findings.at(place))
+        return max(0, term.value)
+
+    def _also(
+        self, means: Means, path: DataPath, raw: Scalar, when: SitedTerm | None, address: str
+    ) -> SitedTerm:
+        """What a key at a path asks for, and `when`."""
+        resolver, key = self.resolver, str(path[-1])
+        resolver.written(
+            raw, INT, self._scope(path, f"{address}.{key}")
+        )  # what is wrong with it stands there
+        value = resolver.findings.expression(path, raw)
+
+        def filled(node: ast.Expr) -> ast.Expr:
+            is_key = isinstance(node, ast.Name) and node.id == key
+            return value if is_key else ast.rebuilt(node, filled)
+
+        scope = self._scope(path, f"{address}.{key}")
+        term = resolver.value(filled(parse_expression(means.condition)), BOOL, scope)
         if when is None:
-            return 0, SitedTerm(late, f"{self.played.member}/{address}.after", resolver.findings.at(place))
-        return 0, SitedTerm(all_of([late, when.term]), when.site, when.span)
+            return SitedTerm(term, scope.draws.site, resolver.findings.at(path))
+        resolver.readings.join(when.site, scope.draws.site)
+        return SitedTerm(all_of([term, when.term]), when.site, when.span)
 
     def condition(self, path: DataPath, raw: object, address: str) -> SitedTerm | None:
         """The condition at a path, of an entry with this address; None if none is written."""

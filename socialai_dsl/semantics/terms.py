@@ -766,6 +766,13 @@ class Readings:
         else:
             self.roots[site] = reading
 
+    def join(self, first: str, second: str) -> None:
+        """The value of one site has become a part of that of another, which holds if both do."""
+        whole, part = self.roots.get(first), self.roots.get(second)
+        if whole is not None and part is not None:
+            node = ast.Logic("and", (part.node, whole.node), at=part.node.at, end=part.node.end)
+            self.roots[first] = Reading(node, None, [part, whole])
+
     def change(self, site: str, change: Callable[[Term], Term | None]) -> None:
         """Replace terms in what was read for a site, as `changed` does."""
         root = self.roots.get(site)

@@ -7,6 +7,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, speech
+from tests.reference.conditions import CONDITIONS
 from tests.reference.effects import Cause, affect, assign, assignments, causes
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern, there
 from tests.reference.script import Belief, Entry, Frame, Rule, Source, Step
@@ -311,7 +312,10 @@ class FrameRunner:
         if rule.once and path in self.me.fired_once:
             return None
         try:
-            if rule.after is not None and self.me.clock < self.turns_before(rule, path):
+            if not all(
+                CONDITIONS[key](self.me.clock, self.number(f"{path}.{key}", raw))
+                for key, raw in rule.asked.items()
+            ):
                 return None
             context = self.heard(rule, path)
             if context is None or not holds(self.when(rule, path), context):
@@ -329,9 +333,9 @@ class FrameRunner:
             self.me.fired_once.add(path)
         return found
 
-    def turns_before(self, rule: Rule, path: str) -> int:
-        """From which turn in the state on a rule can fire."""
-        return int(evaluate(self.expression(f"{path}.after", rule.after), self.context()))
+    def number(self, path: str, raw: Any) -> int:
+        """The number at a path."""
+        return int(evaluate(self.expression(path, raw), self.context()))
 
     def when(self, rule: Rule, path: str) -> Any:
         """The `when` of a rule."""

@@ -9,6 +9,7 @@ from itertools import product
 from typing import Any, Final
 
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from tests.reference.conditions import CONDITIONS
 from tests.reference.world import COLORS, default_name
 
 PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
@@ -42,7 +43,7 @@ class Rule:
     hears: tuple[str, ...] = ()
     addressed: bool | None = None
     when: Any = None
-    after: Any = None
+    asked: Mapping[str, Any] = field(default_factory=dict)  # key of `CONDITIONS` -> a number
     chance: float | None = None
     once: bool = False
     do: str | None = None
@@ -570,7 +571,13 @@ def many(value: Any) -> tuple[Any, ...]:
 
 def rules(entries: Any) -> tuple[Rule, ...]:
     """A list of rules."""
-    return tuple(record(Rule, entry, {"hears": many, "cause": many}) for entry in entries)
+    return tuple(record(Rule, _with_conditions(entry), {"hears": many, "cause": many}) for entry in entries)
+
+
+def _with_conditions(entry: Any) -> dict[str, Any]:
+    """The keys of a rule, those of `CONDITIONS` together."""
+    others = {key: value for key, value in entry.items() if key not in CONDITIONS}
+    return others | {"asked": {key: entry[key] for key in CONDITIONS if entry.get(key) is not None}}
 
 
 def steps_of(steps: Any) -> tuple[Step, ...]:

@@ -357,3 +357,15 @@ def test_every_key_of_a_rule_that_is_written_is_shown(tiny: Folder) -> None:
     assert reason(play, "self.x")["words"] == (
         "hears: any, addressed: false, when: self.x == 9, chance: 0.5, once: true, say: Hello., to: agent"
     )
+
+
+def test_a_key_that_means_a_condition_is_explained_as_that_condition(tiny: Folder) -> None:
+    """Alone, and beside `when`."""
+    late = "{after: asked + 5, when: agent.x == 1, say: Late.}"
+    play = tiny(GUIDE.replace("{hears: Say bye, after: 3, say: Bye.}", late)).step(None)
+    entry = reason(play, "say: Late.")
+    assert entry["part"] == "turns_in_state >= asked + 5"
+    assert entry["values"]["turns_in_state"] == 1
+    alone = late.replace(" when: agent.x == 1,", "")
+    play = tiny(GUIDE.replace("{hears: Say bye, after: 3, say: Bye.}", alone)).step(None)
+    assert reason(play, "say: Late.")["part"] == "turns_in_state >= asked + 5"

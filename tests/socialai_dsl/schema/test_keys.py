@@ -14,10 +14,12 @@ from socialai_dsl.authoring.assist import complete
 from socialai_dsl.authoring.names import meant
 from socialai_dsl.checking import scenarios
 from socialai_dsl.frontend import check
+from socialai_dsl.grammar.ast import Name, parse_expression
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.schema import shape
 from socialai_dsl.schema.annotations import (
     CALLED,
+    conditions_of,
     fields_of,
     holds_of,
     keys_of,
@@ -303,6 +305,13 @@ def test_what_stands_for_missing_parts_is_what_every_scenario_needs() -> None:
 def test_what_a_rule_does_are_keys_of_rules() -> None:
     assert {*DOES} <= {key for model in (FirstRule, WorldRule, Step) for key in keys_of(model)}
     assert {*keys_of(Effects)} <= {*DOES}
+
+
+def test_what_a_key_means_is_about_its_value() -> None:
+    meant = [(key, means) for model in models() for key, means in conditions_of(model).items()]
+    assert meant
+    for key, means in meant:
+        assert key in [part.id for part in parse_expression(means.condition).walk() if isinstance(part, Name)]
 
 
 def test_keys_of_groups() -> None:
