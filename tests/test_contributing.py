@@ -11,8 +11,8 @@ PAGE = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
 WALKS = dict(re.findall(r"^## [^\n`]*`(\w+)[^`\n]*`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
 
 
-def test_there_is_a_walk_for_an_activity_and_one_for_a_value() -> None:
-    assert list(WALKS) == ["stay_near", "turns_in_state"]
+def test_there_is_a_walk_for_an_activity_one_for_a_value_and_one_for_a_key() -> None:
+    assert list(WALKS) == ["stay_near", "turns_in_state", "before"]
 
 
 @pytest.mark.parametrize("word", WALKS)

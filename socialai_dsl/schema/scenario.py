@@ -205,6 +205,9 @@ class Rule(Effects):
     after: Annotated[Expression | None, Hides(False), Means("turns_in_state >= after")] = Field(
         None, description="holds from this turn in the state on"
     )
+    before: Annotated[Expression | None, Hides(False), Means("turns_in_state < before")] = Field(
+        None, description="holds before this turn in the state, and no longer"
+    )
     chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
     once: bool = Field(False, description="once per episode and NPC")
 

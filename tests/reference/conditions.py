@@ -7,5 +7,6 @@ from typing import Final
 
 CONDITIONS: Final[dict[str, Callable[[int, int], bool]]] = {
     "after": lambda turns, number: turns >= number,
+    "before": lambda turns, number: turns < number,
 }
 """Key -> whether it holds after so many turns, with its number."""

@@ -106,6 +106,8 @@ class Behaviour:
             made["when"] = self.phrases.condition(where)
         if self.often(0.2):
             made["after"] = self.rng.randint(1, 4)
+        if self.often(0.15):
+            made["before"] = self.rng.randint(2, 9)
         if self.often(0.12):
             made["once"] = True
         if self.often(0.15):
