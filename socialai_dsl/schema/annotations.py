@@ -3,122 +3,72 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from functools import cache
 from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
-from socialai_dsl.schema.curriculum import Curriculum, Group, Phase, Ramp, Until
-from socialai_dsl.schema.experiment import (
-    Condition,
-    Experiment,
-    Grid,
-    Override,
-    Profile,
-    Reference,
-    Settings,
-    Transfer,
-)
-from socialai_dsl.schema.files import FILES, TestsFile
+from socialai_dsl.schema import curriculum as c
+from socialai_dsl.schema import experiment as e
+from socialai_dsl.schema import scenario as s
+from socialai_dsl.schema.files import TestsFile
 from socialai_dsl.schema.holds import TEXTS, Hides, Holds, Kind, Means, branches, said_of
-from socialai_dsl.schema.scenario import (
-    Belief,
-    CastMember,
-    Character,
-    DialogueRoom,
-    DialogueStep,
-    DialogueTest,
-    FirstRule,
-    Frame,
-    Look,
-    Memory,
-    Npc,
-    ObjectGroup,
-    Observe,
-    OnlyThrough,
-    Outcome,
-    Parameter,
-    Probe,
-    Property,
-    Published,
-    Register,
-    Reward,
-    Role,
-    Room,
-    Scenario,
-    Sequence,
-    Source,
-    State,
-    Step,
-    SungWith,
-    ThenRule,
-    UtteranceGrammar,
-    WorldRule,
-)
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
 from socialai_dsl.source import DataPath
 
 CALLED: Final[dict[type, str]] = {
-    Scenario: "a scenario",
-    Frame: "a frame",
-    State: "a state",
-    FirstRule: "a rule of `first`",
-    ThenRule: "a rule of `then`",
-    Step: "a step",
-    CastMember: "a member of the cast",
-    Npc: "an npc file",
-    Character: "`npc_defaults`",
-    Role: "a role",
-    WorldRule: "a rule of the world",
-    Sequence: "a sequence",
-    SungWith: "the utterance of a sequence",
-    Memory: "a memory",
-    Register: "a register",
-    Look: "a look",
-    Belief: "a belief",
-    Source: "a source of a belief",
-    Reward: "`reward`",
-    ObjectGroup: "an object",
-    Room: "the room",
-    Observe: "`observe`",
-    UtteranceGrammar: "a grammar",
-    Outcome: "an outcome",
-    Property: "a property of `check`",
-    Published: "a published figure",
-    OnlyThrough: "`only_through`",
-    Probe: "a probe",
-    DialogueTest: "an entry of `tests`",
-    DialogueRoom: "the room of a test",
-    DialogueStep: "a step of a test",
+    s.Scenario: "a scenario",
+    s.Frame: "a frame",
+    s.State: "a state",
+    s.FirstRule: "a rule of `first`",
+    s.ThenRule: "a rule of `then`",
+    s.Step: "a step",
+    s.CastMember: "a member of the cast",
+    s.Npc: "an npc file",
+    s.Character: "`npc_defaults`",
+    s.Role: "a role",
+    s.WorldRule: "a rule of the world",
+    s.Sequence: "a sequence",
+    s.SungWith: "the utterance of a sequence",
+    s.Memory: "a memory",
+    s.Register: "a register",
+    s.Look: "a look",
+    s.Belief: "a belief",
+    s.Source: "a source of a belief",
+    s.Reward: "`reward`",
+    s.ObjectGroup: "an object",
+    s.Room: "the room",
+    s.Observe: "`observe`",
+    s.UtteranceGrammar: "a grammar",
+    s.Outcome: "an outcome",
+    s.Property: "a property of `check`",
+    s.Published: "a published figure",
+    s.OnlyThrough: "`only_through`",
+    s.Probe: "a probe",
+    s.DialogueTest: "an entry of `tests`",
+    s.DialogueRoom: "the room of a test",
+    s.DialogueStep: "a step of a test",
     TestsFile: "a file of tests",
-    Parameter: "a parameter",
+    s.Parameter: "a parameter",
     Suite: "a suite",
     Split: "a split",
     Entry: "a member",
     Value: "a value of a tree",
-    Experiment: "an experiment",
-    Condition: "a condition",
-    Grid: "a grid",
-    Settings: "settings",
-    Override: "an override",
-    Profile: "a profile",
-    Transfer: "a test",
-    Reference: "a reference",
-    Curriculum: "a curriculum",
-    Phase: "a phase",
-    Group: "a group of members",
-    Ramp: "a weight that changes",
-    Until: "the end of a phase",
+    e.Experiment: "an experiment",
+    e.Condition: "a condition",
+    e.Grid: "a grid",
+    e.Settings: "settings",
+    e.Override: "an override",
+    e.Profile: "a profile",
+    e.Transfer: "a test",
+    e.Reference: "a reference",
+    c.Curriculum: "a curriculum",
+    c.Phase: "a phase",
+    c.Group: "a group of members",
+    c.Ramp: "a weight that changes",
+    c.Until: "the end of a phase",
 }
 """How messages call what a model describes."""
-
-
-_FAMILIES: Final = (
-    (Experiment, Condition, Grid, Settings, Override, Profile, Transfer, Reference),
-    (Curriculum, Phase, Group, Ramp, Until),
-)
-"""Models of the files that are not about scenarios."""
 
 
 @cache
@@ -148,8 +98,10 @@ def home_of(key: str, owner: type | None) -> str | None:
     return " or ".join(dict.fromkeys(homes[:2])) if homes else None
 
 
-def _family(model: type | None) -> tuple[type, ...]:
-    return next((family for family in _FAMILIES if model in family), ())
+def _family(model: type | None) -> str:
+    """The kind of file that a model is a part of: an experiment, a curriculum, or any that is about scenarios."""
+    module = model.__module__ if model is not None else ""
+    return module if module in (e.__name__, c.__name__) else ""
 
 
 def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:
@@ -242,7 +194,7 @@ _STEP: Final = re.compile(r"\[[^\[\]]*\]|[^.\[\]]+")
 def _patched(path: str) -> Any:
     """The annotation of what a patch changes, whose path is a text such as `outcome[0].success`."""
     steps = tuple(0 if step.startswith("[") else step for step in _STEP.findall(path))
-    found = (annotation_at(model, steps) for model in (Scenario, Suite))
+    found = (annotation_at(model, steps) for model in (s.Scenario, Suite))
     return next((annotation for annotation in found if annotation is not Any), Any)
 
 
@@ -273,7 +225,7 @@ def texts_by_key() -> dict[str, Holds]:
     """What a key holds that is a text in every model that has it, for one that stands in a wrong place."""
     found: dict[str, Holds] = {}
     others: set[str] = set()
-    for model in models():
+    for model in CALLED:
         for key, annotation in fields_of(model).items():
             held = holds_of(annotation)
             if held is not None and held.kind in TEXTS:
@@ -283,40 +235,17 @@ def texts_by_key() -> dict[str, Holds]:
     return {key: held for key, held in found.items() if key not in others}
 
 
-@cache
-def models() -> tuple[type[BaseModel], ...]:
-    """The model of every file and of every part of one."""
-    found: dict[type[BaseModel], None] = {}
-    waiting = [model for files in FILES.values() for model in files]
-    while waiting:
-        model = waiting.pop()
-        if model not in found:
-            found[model] = None
-            waiting += [part for annotation in fields_of(model).values() for part in _models_in(annotation)]
-    return tuple(found)
-
-
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _models_in(part)
-
-
 def sections_of(model: type[BaseModel]) -> tuple[list[str], list[str]]:
     """The sections that a file may leave out, empty by default: the mappings, then the lists."""
     mappings, lists = list[str](), list[str]()
-    for name, field in model.model_fields.items():
-        parts = list(branches(field.annotation))
-        if any(
-            get_origin(part) is dict or (isinstance(part, type) and issubclass(part, BaseModel))
-            for part in parts
-        ):
-            mappings.append(field.alias or name)
-        elif any(get_origin(part) in (tuple, list) for part in parts) and (
+    for key, field in zip(fields_of(model), model.model_fields.values(), strict=True):
+        kinds = [get_origin(part) or part for part in branches(field.annotation)]
+        if any(kind is dict or (isinstance(kind, type) and issubclass(kind, BaseModel)) for kind in kinds):
+            mappings.append(key)
+        elif {tuple, list} & {*kinds} and (
             field.is_required() or not field.get_default(call_default_factory=True)
         ):
-            lists.append(field.alias or name)
+            lists.append(key)
     return mappings, lists
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -25,11 +26,11 @@ from socialai_dsl.schema.annotations import (
     keys_of,
     keys_that_hold,
     may_hide,
-    models,
     sections_of,
 )
 from socialai_dsl.schema.experiment import Hyper
 from socialai_dsl.schema.files import (
+    FILES,
     CurriculumFile,
     ExperimentFile,
     NpcFile,
@@ -67,6 +68,19 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for part in get_args(annotation):
         yield from models_in(part)
+
+
+@cache
+def models() -> tuple[type[BaseModel], ...]:
+    """The model of every file and of every part of one."""
+    found: dict[type[BaseModel], None] = {}
+    waiting = [model for files in FILES.values() for model in files]
+    while waiting:
+        model = waiting.pop()
+        if model not in found:
+            found[model] = None
+            waiting += [part for annotation in fields_of(model).values() for part in models_in(annotation)]
+    return tuple(found)
 
 
 def test_every_model_has_a_name_in_messages_and_its_keys_in_the_reference() -> None:
