@@ -117,7 +117,11 @@ class ActionLanguage:
     def __init__(self, program: Playable) -> None:
         self._actions = (*program.actions, _STANDING)
         self._templates = tuple(dict.fromkeys(program.templates))
-        self._slots = {slot.name: tuple(dict.fromkeys(slot.words)) for slot in program.sentences.slots}
+        self._slots = {
+            slot.name: tuple(dict.fromkeys(slot.words))
+            for slot in program.sentences.slots
+            if slot.name == NOUN or any(slot.place in template for template in self._templates)
+        }
         self._movements = {
             tuple(words(said)): action
             for action in self._actions

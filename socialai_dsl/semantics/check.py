@@ -454,6 +454,9 @@ class _Run:
         tested = dialogues(resolver, outcomes)
         for one in (*rules, *(one for plan in plans for one in plan.causing)):
             self._look_at_size(one)
+        if scenario.grammar.slots:
+            heard = {str(path[-1]) for path in resolver.used if path[:2] == ("grammar", "slots")}
+            possible.check_use_of_slots(self._symbols.sentences, heard, findings)
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -539,7 +542,7 @@ class _Run:
         slots = self._scenario.grammar.slots
         if len(self._symbols.slots) < len(slots):
             return False  # a slot that cannot be filled, which has been reported
-        return not slots or possible.check_slots_of_grammar(self._symbols.sentences, self._findings)
+        return not slots or possible.check_sentences(self._symbols.sentences, self._findings)
 
     def _spoken(self) -> dict[str, dict[DataPath, Line]]:
         """What everybody says, before what anybody hears: member -> the lines of its frame."""

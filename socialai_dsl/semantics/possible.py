@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Container, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from heapq import merge
 from itertools import product
@@ -122,15 +122,19 @@ def check_alike(part: str, words: Iterable[object], findings: Findings) -> None:
             findings.error("S213", message, span, hint=hint)
 
 
-def check_slots_of_grammar(sentences: Sentences, findings: Findings) -> bool:
-    """Slots that no template has, too many sentences, and sentences said in two ways; False if there are too many."""
+def check_use_of_slots(sentences: Sentences, heard: Container[str], findings: Findings) -> None:
+    """Slots that no template has and that nobody hears (`heard`)."""
     names = {slot.name for slot in sentences.slots}
-    for place, slot in enumerate(sentences.slots):
-        strange = any(set(re.findall("<([^<>]*)>", template)) - names for template in sentences.templates)
-        if not strange and not any(used[place] for used in sentences.used):
+    strange = any(set(re.findall("<([^<>]*)>", template)) - names for template in sentences.templates)
+    for place, slot in enumerate(sentences.slots if not strange else ()):
+        if slot.name not in heard and not any(used[place] for used in sentences.used):
             span = findings.places.key_span(("grammar", "slots", slot.name))
-            hint = "every slot is a choice of its own for the agent; leave out what it cannot say"
+            hint = f"leave it out, unless a rule hears it from others: `hears: I offer {slot.place}`"
             findings.error("S104", f"no template has `{slot.place}`", span, hint=hint)
+
+
+def check_sentences(sentences: Sentences, findings: Findings) -> bool:
+    """Too many sentences, and sentences said in two ways; False if there are too many."""
     if (count := len(sentences.templates) * sentences.fillings) > MOST_PAIRS:
         sizes = " x ".join(map(str, sentences.radices))
         product_of = f"{len(sentences.templates)} x {sizes} = {count:,}"

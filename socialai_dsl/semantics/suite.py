@@ -10,7 +10,7 @@ from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.semantics.possible import check_grammar
+from socialai_dsl.semantics.possible import check_grammar, check_sentences, check_use_of_slots
 from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Pattern
@@ -79,10 +79,21 @@ def shared_space(
     slot_maps = tuple(tuple(mapped[number] for mapped in maps) for number in range(len(members)))
     sentences = Sentences.shared(templates, slots, list(zip(own, template_maps, strict=True)))
     space = SharedSpace(actions, sentences, template_maps, slot_maps)
+    if written is not None and written.slots and not bag.has_errors:
+        findings, said = Findings(bag, places), Sentences.of(templates, slots)
+        if check_sentences(said, findings):
+            check_use_of_slots(said, {name for one in own for name in _only_heard(one)}, findings)
     if written is not None and not bag.has_errors:
         for number, (name, member) in enumerate(zip(names, members, strict=True)):
             _check_sayable(space, number, name, member, places, bag)
     return space
+
+
+def _only_heard(sentences: Sentences) -> Iterator[str]:
+    """The slots of a member that only others fill."""
+    for place, slot in enumerate(sentences.slots):
+        if not any(used[place] for used in sentences.used):
+            yield slot.name
 
 
 def _check_looks(

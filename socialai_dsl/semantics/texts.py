@@ -227,6 +227,7 @@ def _spoken_part(resolver: Resolver, part: str | ast.Expr, scope: Scope) -> str 
         return part
     if isinstance(part, ast.Name) and part.id not in scope.variables:
         if part.id in resolver.symbols.slots:
+            resolver.used.add(("grammar", "slots", part.id))
             return f"<{part.id}>"
         if part.id == NOUN:
             no_nouns(resolver, part, scope)

@@ -105,6 +105,7 @@ class _Author:
             for entry in mappings(played):
                 entry.pop("addressed", None)
         say_somewhere([played[frame.name] for frame in frames if not frame.of_agent], SAYINGS)
+        tell_numbers(name, made["grammar"], [played[frame.name] for frame in frames if not frame.of_agent])
         made |= {"frames": played} if played else {}
         made["cast"] = self.cast()
         if self.often(0.25):
@@ -713,6 +714,22 @@ def say_somewhere(frames: list[dict[str, Any]], texts: tuple[str, ...]) -> None:
         else:
             state = [*frame["states"].values()][number % len(frame["states"])]
             state.setdefault("then", []).append({"chance": 0.25, "say": text})
+
+
+def tell_numbers(name: str, grammar: dict[str, Any], frames: list[dict[str, Any]]) -> None:
+    """Let members tell each other numbers in a slot that no template has, some of them no word of it."""
+    rng, told = Random(name), [frame for frame in frames if "states" in frame]
+    if not told or not 0 < len(grammar.get("slots", ())) < 3 or rng.random() < 0.4:
+        return
+    grammar["slots"]["heap"] = "1..4"
+    says = {"when": f"t % {rng.randint(2, 4)} == 1", "say": f"It makes <t % {rng.randint(3, 6)} + 1>"}
+    hears = {
+        "hears": "It makes <heap>",
+        "when": f"heap % 2 == {rng.randint(0, 1)} or heap > {rng.randint(1, 4)}",
+    }
+    for rule in (says, hears | {"say": "It makes <heap + 1>"}):
+        state = rng.choice([*rng.choice(told)["states"].values()])
+        state.setdefault("then", []).insert(0, rule)
 
 
 def mappings(part: Any) -> list[dict[str, Any]]:
