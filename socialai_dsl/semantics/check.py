@@ -74,7 +74,7 @@ from socialai_dsl.semantics.unseen import check_unseen
 from socialai_dsl.source import DataPath, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, mark_of, pieces
 from socialai_dsl.vocabulary import words as words_of
-from socialai_dsl.widths import LARGEST_NUMBER, MOST_WORDS, UNSPOKEN
+from socialai_dsl.widths import MOST_WORDS, UNSPOKEN
 
 KINDS: tuple[PropertyKind, ...] = get_args(PropertyKind)
 DEADLY = "deadly"
@@ -723,7 +723,7 @@ class _Run:
         registers, places = self.resolver.registers, self._findings.places
         found, spans = dict(grown), dict[str, Span]()
         for drawn in (*registers.drawn(), *registers.remembered):
-            if drawn.type.kind == "int" and abs(drawn.type.farthest) > LARGEST_NUMBER:
+            if not drawn.type.is_kept:
                 found.setdefault(drawn.path.partition("(")[0], drawn.type.farthest)
                 spans[drawn.path] = drawn.value.span
         for path, far in found.items():

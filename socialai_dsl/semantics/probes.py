@@ -15,7 +15,6 @@ from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
-from socialai_dsl.widths import LARGEST_NUMBER
 
 _MOST: Final = 64
 """The most possible answers that need not be written out."""
@@ -80,7 +79,7 @@ class NotedValues:
     def value(self, part: str, sited: SitedTerm) -> Drawn:
         """A value with a register of its own."""
         type_ = sited.term.type
-        if abs(type_.farthest) > LARGEST_NUMBER:
+        if not type_.is_kept:
             raise self._resolver.findings.too_large(
                 "this", type_.farthest, sited.span, hint="bound it: `min(..., 100)`"
             )

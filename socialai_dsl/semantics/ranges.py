@@ -47,7 +47,7 @@ class Ranges:
         types = _Types(registers, self.now)
         for path in registers.set_to:
             asked = types.of_all(registers.values_of(path))
-            if abs(asked.farthest) > LARGEST_NUMBER:
+            if not asked.is_kept:
                 self.too_far[path] = asked.farthest
         had = all(registers.type_of(path) == self.now[path] for path in registers.set_to)
         return had or self.now == before

@@ -218,6 +218,19 @@ class Declaration:
     forgets: bool = False
 
 
+@dataclass(frozen=True)
+class _Resolved:
+    """What a register comes to.
+
+    Attributes:
+        term: how it is read, or the known value in its place; None: it means nothing, which has been reported.
+        drawn: what is given a value at reset, one for each of a group.
+    """
+
+    term: Term | None
+    drawn: tuple[Drawn, ...] = ()
+
+
 class Registers:
     """All registers of a scenario.
 
@@ -232,10 +245,8 @@ class Registers:
     def __init__(self, resolver: Resolver, words: Mapping[str, Type], ranges: Mapping[str, Type]) -> None:
         self._resolver = resolver
         self._declared: dict[str, Declaration] = {}
-        self._terms: dict[str, Term | None] = {}
-        self._drawn: dict[str, tuple[Drawn, ...]] = {}
+        self._resolved: dict[str, _Resolved] = {}
         self._busy: list[str] = []
-        self._put: list[str] = []
         self.remembered: list[Drawn] = []
         self._settled: dict[str, tuple[Type, Span]] = {}
         self.words = dict(words)
@@ -246,7 +257,7 @@ class Registers:
 
     def __len__(self) -> int:
         """How many registers are declared or hold a known value."""
-        return len(self._declared) + len(self._terms)
+        return len(self._declared) + len(self._resolved)
 
     def declare(self, declaration: Declaration) -> None:
         """Make a register known; it is resolved later."""
@@ -254,15 +265,13 @@ class Registers:
 
     def known(self, path: str, value: Const) -> None:
         """A register that is a known value."""
-        self._terms[path] = value
+        self._resolved[path] = _Resolved(value)
 
     def put(self, path: str, value: SitedTerm) -> Read:
         """A register that takes a value at reset which is resolved already."""
-        type_ = value.term.type
-        self._terms[path] = Read(type_, path)
-        self._drawn[path] = (Drawn(path, type_, value),)
-        self._put.append(path)
-        return Read(type_, path)
+        read = Read(value.term.type, path)
+        self._resolved[path] = _Resolved(read, (Drawn(path, read.type, value),))
+        return read
 
     def remember(self, value: SitedTerm) -> Read:
         """A register that takes a value at the start of every step."""
@@ -288,19 +297,25 @@ class Registers:
         return tuple(drawn for drawn in self.remembered if drawn.path in used)
 
     def __contains__(self, path: str) -> bool:
-        return path in self._declared or path in self._terms
+        return path in self._declared or path in self._resolved
 
     def declaration(self, path: str) -> Declaration | None:
         """The declaration of a register, None of one that is none of the author's own."""
         return self._declared.get(path)
 
     def drawn(self) -> list[Drawn]:
-        """All registers that are not constants, in the order declared; unused ones are resolved now."""
+        """All registers that are not constants, in the order declared, behind those that were `put`; unused ones are
+        resolved now.
+        """
         for path in self._declared:
             with suppress(FailedError):
                 self.read(path)
         kept = [path for path, declaration in self._declared.items() if not declaration.imagined]
-        return [drawn for path in (*self._put, *kept) for drawn in self._drawn.get(path, ())]
+        put = [path for path in self._resolved if path not in self._declared]
+        return [drawn for path in (*put, *kept) for drawn in self._drawn(path)]
+
+    def _drawn(self, path: str) -> tuple[Drawn, ...]:
+        return self._resolved[path].drawn if path in self._resolved else ()
 
     def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
         """The register (or its constant) as a term; `expected` and `span` are those of the use."""
@@ -309,10 +324,10 @@ class Registers:
         declaration = self._declared.get(path)
         if declaration is not None and expected is not None and span is not None and self.is_wordy(path):
             self._settle(declaration, expected, span)
-        if path not in self._terms:
+        if path not in self._resolved:
             assert declaration is not None, f"internal: no register {path}"
             self._resolve(declaration)
-        term = self._terms[path]
+        term = self._resolved[path].term
         if term is None:
             raise FailedError
         return term
@@ -361,7 +376,7 @@ class Registers:
 
     def drawn_at_reset(self, path: str) -> Term | None:
         """The value that a register gets at reset and keeps; None for a constant, or if rules can set it."""
-        drawn, declaration = self._drawn.get(path, ()), self._declared.get(path)
+        drawn, declaration = self._drawn(path), self._declared.get(path)
         gathers = declaration is not None and (declaration.gathers or declaration.forgets)
         return drawn[0].value.term if len(drawn) == 1 and not (gathers or self.is_set(path)) else None
 
@@ -402,17 +417,17 @@ class Registers:
         if declaration is not None and declaration.range is not None:
             return []
         starts = declaration is None or not declaration.starts_with_nothing
-        drawn = [one.value.term for one in self._drawn.get(path, ()) if starts]
+        drawn = [one.value.term for one in self._drawn(path) if starts]
         return [*drawn, *self._noted.get(path, ()), *self.set_to.get(path, ())]
 
     def type_of(self, path: str) -> Type | None:
         """The type that a register has been resolved with; None if it means nothing."""
-        term = self._terms.get(path)
+        term = self._resolved[path].term if path in self._resolved else None
         return term.type if term is not None else None
 
     def _resolve(self, declaration: Declaration) -> None:
         path = declaration.path
-        self._terms[path] = None
+        self._resolved[path] = _Resolved(None)
         self._busy.append(path)
         try:
             starts = self._starts(declaration)
@@ -420,17 +435,17 @@ class Registers:
             self._busy.pop()
         (first, _), *_ = starts
         if declaration.constant and isinstance(first.term, Const):
-            self._terms[path] = first.term
+            self._resolved[path] = _Resolved(first.term)
             return
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
         if path in self._given_ranges and _counts(type_):
             type_ = union(type_, self._given_ranges[path])
         empties = declaration.starts_with_nothing or declaration.forgets
         nothing = nothing_of(type_) if empties else None
-        self._terms[path] = Read(type_, path, nothing)
         if declaration.starts_with_nothing and nothing is not None:
             starts = [(replace(start, term=Const(type_, nothing)), called) for start, called in starts]
-        self._drawn[path] = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
+        drawn = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
+        self._resolved[path] = _Resolved(Read(type_, path, nothing), drawn)
 
     def _starts(self, declaration: Declaration) -> list[tuple[SitedTerm, str]]:
         """What each register of a declaration starts with, and its path."""

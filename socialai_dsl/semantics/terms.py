@@ -31,6 +31,7 @@ from socialai_dsl.grammar.ast import Leaf
 from socialai_dsl.schema.scenario import Outcome, Rule, Step, WorldRule
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, SIDES, TURNS
+from socialai_dsl.widths import LARGEST_NUMBER
 
 Kind = Literal[
     "bool", "int", "direction", "color", "action", "entity", "text", "noun", "status", "look", "utterance", "cell"
@@ -55,6 +56,11 @@ class Type(Leaf):
     def farthest(self) -> int:
         """The value that is farthest from zero."""
         return max(self.low, self.high, key=abs)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether a register can hold each of them."""
+        return abs(self.farthest) <= LARGEST_NUMBER
 
     @property
     def values(self) -> range:
