@@ -1,6 +1,7 @@
 """Options that several commands have, and numbers on the command line."""
 
 import argparse
+import contextlib
 import json
 import math
 import re
@@ -10,7 +11,10 @@ from typing import Any, Final, TypeVar, get_args
 
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.baselines import MOST_EPISODES
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.source import Source
 
 SECONDS: Final = 20.0
 _LONGEST: Final = 366 * 24 * 3600
@@ -187,10 +191,15 @@ def known_room(text: str) -> Path | dict[str, Any]:
     """A layout, or the file with one."""
     if not text.lstrip().startswith("{"):
         return Path(text)
-    try:
+    with contextlib.suppress(ValueError, RecursionError):
         return dict(json.loads(text))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise argparse.ArgumentTypeError(f"got {_short(text)}, which is no JSON: {error}") from None
+    try:
+        return dict(read_document(Source("layout", text)).data)  # type: ignore[arg-type]
+    except ScenarioError as error:
+        why = error.diagnostics[0].text
+        raise argparse.ArgumentTypeError(
+            f"got {_short(text)}, which is neither JSON nor YAML: {why}"
+        ) from None
 
 
 def identifier(text: str) -> str:

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--layout",
         type=known_room,
         metavar="FILE",
-        help="start in the room that this JSON file, or JSON text, describes (docs/layouts.md)",
+        help="start in the room that this file, or text, describes, in JSON or YAML (docs/layouts.md)",
     )
     played = parser.add_mutually_exclusive_group()
     played.add_argument(

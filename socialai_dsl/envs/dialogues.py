@@ -19,6 +19,7 @@ from socialai_dsl.envs.asking import Companion
 from socialai_dsl.envs.options import reset_arguments
 from socialai_dsl.envs.scenario_env import SILENCE, ScenarioEnv
 from socialai_dsl.envs.starts import misfit_of
+from socialai_dsl.loader.layouts import read_layout
 from socialai_dsl.loader.reader import display_name, read_source
 from socialai_dsl.semantics.dialogues import OPEN
 from socialai_dsl.semantics.plans import ClaimPlan, DialoguePlan, DialogueStepPlan, LinePlan, RulePlan
@@ -133,7 +134,9 @@ class _Performance:
             return
         except ScenarioError as error:
             place = self._room.value_span(("layout",))
-            yield from (replace(finding, span=place) for finding in error.diagnostics)
+            for finding in error.diagnostics:
+                there = "" if finding.code == "S007" else f"{finding.span}: "
+                yield Diagnostic(finding.code, there + finding.message, place, hint=finding.help)
             return
         except RoomError as error:
             yield self._finding("S803", f"there is no such room: {error}", self._room.key_span(), ())
@@ -176,10 +179,7 @@ class _Performance:
         file = self._file(layout)
         if not file.resolve().is_relative_to(self._file("").resolve()):
             raise ValueError(f"layout: {layout} lies outside of the folder of the test")
-        try:
-            return json.loads(read_source(file).text)
-        except (json.JSONDecodeError, RecursionError) as error:
-            raise ValueError(f"layout: {layout} is no JSON: {error}") from None
+        return read_layout(replace(read_source(file), name=layout))
 
     def _begin(self) -> None:
         room = self._plan.room

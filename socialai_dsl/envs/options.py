@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.diagnostics import suggested
+from socialai_dsl.loader.layouts import read_layout
+from socialai_dsl.source import Source
 
 
 def refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str], otherwise: str = "") -> None:
@@ -58,10 +59,11 @@ def reset_arguments(
         seed: of the rooms.
         index: which room of the seed, from 0, as `check` and `validate` number them.
         test_episode: a number of the fixed test set, instead of seed and index.
-        layout: a room to start from, or a JSON file with one (docs/layouts.md).
+        layout: a room to start from, or a JSON or YAML file with one (docs/layouts.md).
 
     Raises:
         ValueError: these cannot go together, or the file is no JSON.
+        ScenarioError: the file is no YAML.
         OSError: the file cannot be read.
     """
     options: dict[str, Any] = {}
@@ -75,9 +77,10 @@ def reset_arguments(
         options["index"] = index
     if isinstance(layout, Path):
         try:
-            options["layout"] = json.loads(layout.read_text(encoding="utf-8"))
-        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-            raise ValueError(f"layout: {layout} is no JSON: {error}") from None
+            source = Source(str(layout), layout.read_text(encoding="utf-8"), layout)
+        except UnicodeDecodeError as error:
+            raise ValueError(f"layout: {layout} is no text: {error}") from None
+        options["layout"] = read_layout(source)
     elif layout is not None:
         options["layout"] = layout
     return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})

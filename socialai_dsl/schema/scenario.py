@@ -722,7 +722,7 @@ class DialogueRoom(Model):
     )
     layout: Annotated[str | dict[str, JsonValue], Holds("layout")] | None = Field(
         None,
-        description="a known room, in the words of layouts, or the JSON file with one",
+        description="a known room, in the words of layouts, or the JSON or YAML file with one",
         examples=[{"agent": {"at": [2, 3], "facing": "up"}, "let": {"exit": "doors[1]"}}],
     )
 

@@ -300,9 +300,16 @@ def test_a_layout_may_lie_in_a_file_beside_the_test(capsys: Capture) -> None:
     assert main(words) == 0
     assert "layout: {agent: {at: [5, 1]}}" in Path("lodge.tests.yaml").read_text()
     assert main(["test", "lodge.yaml", "-k", "far"]) == 0
+    Path("lodge.txt").write_text("agent")
+    Path("slip.yaml").write_text("agent: {at: [5, 1}\n")
+    Path("far.yaml").write_text("agent: {at: [5, 1]}\n")
+    Path("lodge.tests.yaml").write_text(test_with(steps.replace("far.json", "far.yaml")))
+    assert main(["test", "lodge.yaml"]) == 1
+    assert "--layout far.yaml" in capsys.readouterr().out, "in that room, too, nothing is heard"
     for name, said in (
         ("../x.json", "lies outside"),
-        ("lodge.yaml", "is no JSON"),
+        ("lodge.txt", "is no JSON"),
+        ("slip.yaml", "slip.yaml:1:"),
         ("x.json", "no such file"),
     ):
         Path("lodge.tests.yaml").write_text(test_with(steps.replace("far.json", name)))

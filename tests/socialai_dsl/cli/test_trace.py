@@ -115,6 +115,10 @@ def test_a_layout_and_a_test_episode(shy: str, capsys: Capture) -> None:
     Path("room.json").write_text('{"guide": {"at": [3, 1]}}', encoding="utf-8")
     assert main(["trace", shy, "--layout", "room.json", "--do", "Say hello"]) == 0
     assert "heard   Guide: Hello." in capsys.readouterr().out
+    Path("room.yaml").write_text("guide:\n  at: [3, 1]  # beside the agent\n", encoding="utf-8")
+    for written in ("room.yaml", "{guide: {at: [3, 1]}}", '{"guide": {"at": [3, 1]}}'):
+        assert main(["trace", shy, "--layout", written, "--do", "Say hello"]) == 0
+        assert "heard   Guide: Hello." in capsys.readouterr().out
     assert main(["trace", shy, "--test-episode", "4", "--do", ""]) == 0
     assert "test episode 4" in capsys.readouterr().out
 
@@ -142,7 +146,9 @@ def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
         (["--seed", "-1"], "--seed: got -1, expected at least 0"),
         (["--test-episode", "-1"], "--test-episode: got -1"),
         (["--layout", "nowhere.json"], "No such file or directory: nowhere.json"),
-        (["--layout", "shy.yaml"], "is no JSON"),
+        (["--layout", "shy.yaml"], "layout"),
+        (["--layout", "shy.txt"], "is no JSON"),
+        (["--layout", "{guide: {at: [3, 1}"], "which is neither JSON nor YAML: "),
         (["--layout", "wrong.json"], "guide.at"),
         (["--agent", "oracle"], "has no frame"),
         (["--json", "--from", "2"], "--json: got --why or --from with it"),
@@ -150,12 +156,19 @@ def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
     ],
 )
 def test_wrong_usage_is_said_in_one_line(shy: str, options: list[str], said: str, capsys: Capture) -> None:
+    Path("shy.txt").write_text("guide", encoding="utf-8")
     Path("wrong.json").write_text('{"guide": {"at": [0, 99]}}', encoding="utf-8")
     assert main(["trace", shy, *options]) == 2
     captured = capsys.readouterr()
     assert said in captured.err
     assert captured.out == ""
     assert "Traceback" not in captured.err
+
+
+def test_a_slip_in_a_layout_has_its_place(shy: str, capsys: Capture) -> None:
+    Path("slip.yaml").write_text("guide: {at: [3, 1}\n", encoding="utf-8")
+    assert main(["trace", shy, "--layout", "slip.yaml"]) == 1
+    assert "slip.yaml:1:" in "".join(capsys.readouterr())
 
 
 def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
