@@ -390,16 +390,26 @@ def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope
         raise resolver.fail("S204", message, node, scope, hint=hint)
 
 
+def _needs_somebody(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> Exception:
+    """A verb without a subject: who is asked about beside it is meant, else the agent, or a thing."""
+    known = resolver.symbols.objects if signature.subject == "object" else resolver.symbols.numbers
+    near = next((name for name in resolver.subjects_around() if name in known), next(iter(known), ""))
+    message = f"`{signature.name}` needs somebody: `{near or 'door'}.{signature.name}`"
+    hint = (
+        resolver.instead(f"{near}.{ast.unparse(node)}", node, scope, "or whoever it is about")
+        if near
+        else None
+    )
+    return resolver.fail("S211", message, node, scope, hint=hint)
+
+
 def subject_of(
     resolver: Resolver, subject: ast.Expr | None, signature: Signature, node: ast.Expr, scope: Scope
 ) -> Term | None:
     """The subject of a verb: the part before the dot, else the NPC itself. None: the candidate cell."""
     if subject is None:
         if scope.member is None:
-            example = "agent" if signature.subject != "object" else "door"
-            raise resolver.fail(
-                "S211", f"`{signature.name}` needs somebody: `{example}.{signature.name}`", node, scope
-            )
+            raise _needs_somebody(resolver, signature, node, scope)
         return entity(resolver.symbols.numbers[scope.member])
     if isinstance(subject, ast.Name) and subject.id == "here" and "here" not in scope.variables:
         if not scope.here:

@@ -71,6 +71,10 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         if word.takes == ("group",) and len(node.args) > 1:
             several = " | ".join(map(quoted, node.args))
             hint = resolver.instead(f"{node.name}({several})", node, scope, "alternatives are written a | b")
+        elif word.subject != "none" and node.subject is None and len(node.args) == most + 1:
+            who, *others = map(ast.unparse, node.args)
+            if who in resolver.symbols.numbers or who in resolver.symbols.objects:
+                hint = resolver.instead(f"{who}.{node.name}({', '.join(others)})", node, scope)
         raise resolver.fail("S211", wrong_count(word, len(node.args)), node, scope, hint=hint)
     if word.subject == "none" and node.subject is not None:
         message = f"`{node.name}` has nothing before it: write `{node.name}(...)`"

@@ -676,6 +676,13 @@ class Resolver(ABC):
         around = (part for part, _ in reversed(self._within))
         return any(isinstance(part, ast.Attribute | ast.Call) and part.subject is node for part in around)
 
+    def subjects_around(self) -> Iterator[str]:
+        """The names of which something is asked in the expression, a part of which is being resolved."""
+        for whole, _ in self._within[:1]:
+            for part in ast.walk(whole):
+                if isinstance(part, ast.Attribute | ast.Call) and isinstance(part.subject, ast.Name):
+                    yield part.subject.id
+
     def no_such(
         self, word: str, message: str, node: ast.Expr, scope: Scope, **more: Unpack[Advice]
     ) -> FailedError:
