@@ -8,7 +8,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, counted, printable, render_text, to_json
-from socialai_dsl.source import Source
+from socialai_dsl.source import Source, Span
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class CheckedInput:
 def limited(checked: Sequence[CheckedInput], most: int) -> list[CheckedInput]:
     """The results with the first `most` errors alone; one in a file that several inputs share counts once."""
     errors = [d for d in every_finding(checked) if d.severity is Severity.ERROR]
-    hidden = set(errors[most:])
+    hidden = set(map(_mistake, errors[most:]))
     return [
         replace(
             c,
-            diagnostics=tuple(d for d in c.diagnostics if d not in hidden),
-            left_out=sum(d in hidden for d in c.diagnostics),
+            diagnostics=tuple(d for d in c.diagnostics if _mistake(d) not in hidden),
+            left_out=sum(_mistake(d) in hidden for d in c.diagnostics),
         )
         for c in checked
     ]
@@ -121,8 +121,31 @@ FORMATS: Final[dict[str, Callable[[Sequence[CheckedInput]], str]]] = {
 
 
 def every_finding(checked: Iterable[CheckedInput]) -> list[Diagnostic]:
-    """Every finding once, even where several inputs share the file it lies in."""
-    return list(dict.fromkeys(d for c in checked for d in c.diagnostics))
+    """Every finding once, even where several inputs share the file it lies in.
+
+    What a file says of itself is said in place of what its variants say of it, which name their patches as well.
+    """
+    found: dict[_Mistake, dict[Diagnostic, None]] = {}
+    for c in checked:
+        own: dict[_Mistake, dict[Diagnostic, None]] = {}
+        for d in c.diagnostics:
+            own.setdefault(_mistake(d), {})[d] = None
+        for mistake, said in own.items():
+            if mistake not in found or _length(said) < _length(found[mistake]):
+                found[mistake] = said
+    return [d for said in found.values() for d in said]
+
+
+_Mistake = tuple[str, Span, str]
+
+
+def _mistake(found: Diagnostic) -> _Mistake:
+    """What two findings of one mistake have in common, whatever they propose."""
+    return found.code, found.span, found.text
+
+
+def _length(said: Iterable[Diagnostic]) -> int:
+    return sum(len(d.help or "") for d in said)
 
 
 def _json(value: Any) -> str:

@@ -1,11 +1,12 @@
 """What each format of `socialai validate` prints."""
 
 import json
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
 
-from socialai_dsl.checking.formats import CheckedInput
+from socialai_dsl.checking.formats import CheckedInput, every_finding, limited
 from socialai_dsl.cli.validate import REPORTS
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.source import Source, Span
@@ -34,6 +35,20 @@ def test_text_points_at_the_line_and_counts_shared_findings_once() -> None:
         "3 files checked: 1 error, 1 warning",
         "`socialai explain S101` says more about S101",
     ]
+
+
+def test_a_mistake_is_said_once_of_a_file_and_its_variants() -> None:
+    of_variant = replace(ERROR, hint="in `a+v`, patched by a_v.yaml")
+    inputs = [
+        CheckedInput(name, (one,), {"a.yaml": SOURCE}) for name, one in (("a_v", of_variant), ("a", ERROR))
+    ]
+    for order in (inputs, inputs[::-1]):
+        assert every_finding(order) == [ERROR], "as the file itself says it"
+        assert [c.errors for c in limited(order, 0)] == [1, 1]
+        assert every_finding(limited(order, 0)) == []
+    assert every_finding(inputs[:1]) == [of_variant]
+    twice = CheckedInput("a", (ERROR, of_variant), {"a.yaml": SOURCE})
+    assert every_finding([twice]) == [ERROR, of_variant], "what one input says twice differs"
 
 
 def test_json_is_an_array_of_findings() -> None:
