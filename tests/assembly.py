@@ -20,6 +20,7 @@ from socialai_dsl.program import (
     EntityColumn,
     EntityName,
     Field,
+    Flag,
     FrameColumn,
     Header,
     Op,
@@ -346,6 +347,9 @@ class Assembly:
             rows += [first, len(tokens), heard, -1]
             first += len(tokens)
         return rows
+
+
+HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
 def part_of(program: Program, first_outcome: int = 0) -> LinkedProgram:
