@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from functools import reduce
 
 from socialai_dsl.semantics.resolver import Registers, union
@@ -155,7 +154,7 @@ class _Types:
                 found = type_ if known else reduce(union, parts)
             case _:
                 found = type_
-        return replace(type_, low=found.low, high=found.high)
+        return type_.ranging(found.low, found.high)
 
     def _of_register(self, path: str, type_: Type) -> Type:
         if path in self._registers.set_to:
@@ -171,8 +170,8 @@ class _Types:
 
 def _cut(type_: Type) -> Type:
     """A range as far as a register can hold it."""
-    low, high = (max(-LARGEST_NUMBER, min(end, LARGEST_NUMBER)) for end in (type_.low, type_.high))
-    return replace(type_, low=low, high=high)
+    low, high = max(type_.low, -LARGEST_NUMBER), min(type_.high, LARGEST_NUMBER)
+    return type_.ranging(min(low, LARGEST_NUMBER), max(high, -LARGEST_NUMBER))
 
 
 def _gain(start: Type, now: Type) -> tuple[int, int]:
@@ -185,12 +184,12 @@ def _within(gain: tuple[int, int], other: tuple[int, int]) -> bool:
 
 
 def _widened(start: Type, gain: tuple[int, int], times: int) -> Type:
-    return _cut(replace(start, low=start.low - gain[0] * times, high=start.high + gain[1] * times))
+    return _cut(start.ranging(start.low - gain[0] * times, start.high + gain[1] * times))
 
 
 def _common(a: Type, b: Type) -> Type:
     """The values of both ranges."""
-    return replace(a, low=max(a.low, b.low), high=min(a.high, b.high))
+    return a.ranging(max(a.low, b.low), min(a.high, b.high))
 
 
 # -- what follows from what ------------------------------------------------------------------------------------

@@ -519,7 +519,7 @@ def _counts(type_: Type) -> bool:
 
 def union(a: Type, b: Type) -> Type:
     """The first type with room for the values of another of its kind."""
-    return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))
+    return a.ranging(min(a.low, b.low), max(a.high, b.high))
 
 
 # -- the resolver --------------------------------------------------------------------------------------------

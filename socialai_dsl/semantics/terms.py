@@ -57,6 +57,10 @@ class Type(Leaf):
         """The value that is farthest from zero."""
         return max(self.low, self.high, key=abs)
 
+    def ranging(self, low: int, high: int) -> Type:
+        """The same kind of value, from `low` to `high`."""
+        return Type(self.kind, low, high, self.words)
+
     @property
     def is_kept(self) -> bool:
         """Whether a register can hold each of them."""
