@@ -223,14 +223,12 @@ def _substituted(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     raise resolver.fail("S204", message, node, scope)
 
 
-def _member_text(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
+def _member_text(resolver: Resolver, node: ast.Name | ast.Attribute, scope: Scope) -> Term:
     """The text that fills a slot; with `<...>` it can only be said."""
     slot = texts.text_slot(resolver, node, scope)
     assert slot is not None, "internal: a slot of type text"
     if any(filling.text.plain is None for filling in slot):
-        message = (
-            f"`{node.id}` is filled with a text that has <...>: it can be said or heard, not computed with"
-        )
+        message = f"`{quoted(node)}` is filled with a text that has <...>: it can be said or heard, not computed with"
         raise resolver.fail("S204", message, node, scope)
     return texts.plain_text(slot)
 
@@ -536,6 +534,8 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
                 return single(resolver, register, None, node, scope)
             if played is not None and played.model.slots.get(node.name) == "bool":
                 return member_truth(resolver, played, node.name, scope)
+            if played is not None and played.model.slots.get(node.name) == "text":
+                return _member_text(resolver, node, scope)
         # Nothing is known of the attributes of an unknown member.
         known = node.name in VALUES or node.name in _statuses(resolver)
         if not known and resolver.means_nothing(node.subject.id, scope):
