@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from socialai_dsl import cures
+from socialai_dsl.checking.consequences import Consequences
 from socialai_dsl.diagnostics import (
     Diagnostic,
     DiagnosticBag,
@@ -26,7 +27,7 @@ from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.cast import members
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import Data, DataPath, Node, Span
+from socialai_dsl.source import Data, Node, Span
 from socialai_dsl.vocabulary import PRIMITIVES, spelt
 
 Value = int | bool | float | str
@@ -303,15 +304,6 @@ _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 _OF_ALL_VARIANTS = frozenset({"W314", "W317"})
 """What a variant or rival may leave without a use in parts that are there for the others."""
 
-_MAY_FOLLOW = frozenset("S105 S201 S204 S205 S206 S213 S301 S302 S303 S304 S305 S310 S315 S401 S402".split())
-"""What may be wrong only because a part of the file was left out, which has been reported."""
-
-_FOLLOW_FROM_THE_GRAMMAR = frozenset({"S201", "S204", "S302", "S303", "S401", "S402"})
-"""What may be wrong only because the grammar was left out, which has the slots and what can be said."""
-
-_OF_WHOLE_FILES = frozenset({"S316"})
-"""What can only be said of a file without other errors: whatever has one may be what would make it possible."""
-
 
 @dataclass(frozen=True)
 class Draft:
@@ -480,15 +472,9 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     if not bag.has_errors:
         bag.extend(found)
         return checked
-    doubtful = _OF_WHOLE_FILES.union(*map(_following, shaped.lost))
-    bag.extend(d for d in found if d.severity is Severity.ERROR and d.code not in doubtful)
+    following = Consequences(shaped.tree, shaped.lost)
+    bag.extend(d for d in found if d.severity is Severity.ERROR and not following.may_be(d))
     return None
-
-
-def _following(lost: DataPath) -> frozenset[str]:
-    if lost[:1] == ("tests",):
-        return frozenset()  # nothing else depends on a test
-    return _FOLLOW_FROM_THE_GRAMMAR if lost == ("grammar",) else _MAY_FOLLOW
 
 
 def put_grammar(tree: Node, bag: DiagnosticBag) -> None:

@@ -6,18 +6,19 @@ import math
 import os
 import re
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
 
 import yaml
+from pydantic import BaseModel
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.schema.annotations import held_at, texts_by_key
+from socialai_dsl.schema.annotations import has_unknown_key, held_at, texts_by_key
 from socialai_dsl.schema.files import FILES, model_of_file
 from socialai_dsl.schema.holds import TEXTS
 from socialai_dsl.source import DataPath, Node, NodeSpan, Scalar, Source, Span, Style, TextEdit
@@ -273,22 +274,27 @@ def _refused(text: str, reading: str, instead: str | None = None, otherwise: str
 _NOTHING: Final = ("", "~")
 
 
-def read_in_place(root: Node, path: DataPath, plain: Plain, text: str) -> Plain:
+def models_of(root: Node) -> list[type[BaseModel]]:
+    """The models that a document may be one of: one, where its first keys say what kind of file it is."""
+    keys = root.children if isinstance(root.children, dict) else {}
+    known = model_of_file({key: part.value for key, part in keys.items()})
+    return [known] if known is not None else [model for models in FILES.values() for model in models]
+
+
+def read_in_place(models: Sequence[type[BaseModel]], path: DataPath, plain: Plain, text: str) -> Plain:
     """The value of a plain word at its place in a document: where a text may stand, the text itself.
 
     Args:
-        root: the document.
+        models: those that the document may be one of.
         path: where in it the word stands.
         plain: what YAML takes it for.
         text: the word as it is written.
     """
     if text in _NOTHING:
         return plain
-    keys = root.children if isinstance(root.children, dict) else {}
-    file = {key: part.value for key, part in keys.items()}
-    known = model_of_file(file)
-    possible = [known] if known is not None else [model for models in FILES.values() for model in models]
-    held = next(filter(None, (held_at(model, path) for model in possible)), None)
+    if plain.code == "S003" and len(models) == 1 and has_unknown_key(models[0], path):
+        return Plain(text)  # the key is what is reported
+    held = next(filter(None, (held_at(model, path) for model in models)), None)
     held = held or texts_by_key().get(next((s for s in reversed(path) if isinstance(s, str)), ""))
     if held is None or held.kind not in TEXTS or (held.kind == "prose" and text == "null"):
         return plain
@@ -475,9 +481,10 @@ class _Builder:
 
     def read_plain_words(self) -> None:
         """Give each plain word its value, now that it is known what kind of file it is."""
+        models = models_of(self.root)
         for path, node, plain in self._unread:
             span = node.span
-            read = read_in_place(self.root, path, plain, str(node.value))
+            read = read_in_place(models, path, plain, str(node.value))
             node.value, node.span = read.value, replace(span, read=read.value)
             if read.code:
                 place = self.source.edit(span.start, span.end, read.instead or "")

@@ -205,6 +205,15 @@ def conditions_of(model: type[BaseModel]) -> dict[str, Means]:
     return {key: means for key, means in said.items() if means is not None}
 
 
+def has_unknown_key(model: type[BaseModel], path: DataPath) -> bool:
+    """Whether a path goes through a key that the model there does not have."""
+    around = [model_at(model, path[:length]) for length in range(len(path))]
+    return any(
+        one is not None and isinstance(step, str) and step not in keys_of(one)
+        for one, step in zip(around, path, strict=True)
+    )
+
+
 def may_hide(model: type[BaseModel], path: DataPath) -> bool:
     """Whether a mistake at a path may make other parts of the file look wrong."""
     if model_at(model, path[:-1]) is None:

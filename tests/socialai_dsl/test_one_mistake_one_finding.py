@@ -163,6 +163,43 @@ def test_one_mistake_gives_one_error(scenarios: Path, kind: Callable[[str], Iter
     assert check_mistakes(scenarios, kind, most=1) >= 4
 
 
+SPARE = "spare_one: [1, 2]"
+"""A `let` that nobody uses and that is no expression."""
+
+ELSEWHERE = (names_misspelt, verbs_misspelt, states_misspelt)
+
+
+@pytest.mark.parametrize("kind", ELSEWHERE, ids=lambda kind: kind.__name__)
+def test_a_mistake_hides_none_that_has_nothing_to_do_with_it(
+    scenarios: Path, kind: Callable[[str], Iterator[Site]]
+) -> None:
+    """Two mistakes, of which neither speaks of the other: both are found.
+
+    Rivals are checked once the file is right without them.
+    """
+    made = 0
+    for name in SCENARIOS:
+        path = scenarios / name
+        text = path.read_text(encoding="utf-8")
+        rivals = re.search(r"^rivals:\n(?:  .*\n|\n)*", text, re.MULTILINE)
+        inside = range(*rivals.span()) if rivals else range(0)
+        found = [site for site in sites(kind, text) if site[0] not in inside]
+        for start, end, wrong in Random(f"{kind.__name__} {name}").sample(found, min(1, len(found))):
+            mistaken = text[:start] + wrong + text[end:]
+            if re.search(r"^let:\n", text, re.MULTILINE):
+                mistaken = re.sub(r"^let:\n", f"let:\n  {SPARE}\n", mistaken, count=1, flags=re.MULTILINE)
+            elif not re.search(r"^let:", text, re.MULTILINE):
+                mistaken += f"\nlet: {{{SPARE}}}\n"
+            else:
+                continue
+            path.write_text(mistaken, encoding="utf-8")
+            codes = sorted(d.code for d in check(name).diagnostics)
+            assert codes == sorted(["S104", KINDS[kind]]), (name, wrong, codes)
+            made += 1
+        path.write_text(text, encoding="utf-8")
+    assert made >= 4
+
+
 def test_a_member_misspelt_in_the_cast_gives_one_error(scenarios: Path) -> None:
     """It may stand anywhere where the name is used, and says how the cast spells it."""
     made = 0
