@@ -16,7 +16,7 @@ from socialai_dsl.engine.pointers import make_book, replace_in
 from socialai_dsl.engine.queries import identify, script
 from socialai_dsl.engine.state import (
     ATTEMPTS,
-    Book,
+    ArrayId,
     Key,
     Link,
     Ports,
@@ -185,7 +185,7 @@ class Batch:
         if pins is not None or len(self.ports.pins) > 1:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
-            replace_in(self._book, Book.PINS, self.ports.pins)  # so that prepared calls stay valid
+            replace_in(self._book, ArrayId.PINS, self.ports.pins)  # so that prepared calls stay valid
         self._serve(Task.RESET)
 
     def script(self) -> None:

@@ -23,7 +23,7 @@ from socialai_dsl.engine.pointers import (
 )
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
-from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
+from socialai_dsl.engine.state import ZERO, ArrayId, Key, Link, Row, Size
 from socialai_dsl.engine.step import step_row
 from socialai_dsl.engine.views import CELLS
 from socialai_dsl.program import Header, Register
@@ -33,11 +33,11 @@ from socialai_dsl.widths import UNPINNED
 @outline
 def _keep_final(book: Any, row: int) -> None:
     stay_outline()
-    length = int64_of(book, Book.SIZES, ZERO)[Size.TOKENS]
-    copy(uint32_of(book, Book.FINAL_IMAGE, row), uint32_of(book, Book.IMAGE, row), np.int64(CELLS))
-    copy(tokens_of(book, Book.FINAL_TOKENS, row), tokens_of(book, Book.TOKENS, row), length)
-    gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
-    copy(uint16_of(book, Book.FINAL_EXTRA, row), uint16_of(book, Book.EXTRA, row), gestures)
+    length = int64_of(book, ArrayId.SIZES, ZERO)[Size.TOKENS]
+    copy(uint32_of(book, ArrayId.FINAL_IMAGE, row), uint32_of(book, ArrayId.IMAGE, row), np.int64(CELLS))
+    copy(tokens_of(book, ArrayId.FINAL_TOKENS, row), tokens_of(book, ArrayId.TOKENS, row), length)
+    gestures = int64_of(book, ArrayId.SIZES, ZERO)[Size.EXTRA]
+    copy(uint16_of(book, ArrayId.FINAL_EXTRA, row), uint16_of(book, ArrayId.EXTRA, row), gestures)
 
 
 @inline
@@ -78,19 +78,19 @@ def _open_act(book: Any, opened: Row) -> int:
     first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
     key[Key.ACT] = np.uint64(act)
     key[Key.KEY] = rng.act_key(rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE]), act)
-    key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first + act])
+    key[Key.PROGRAM] = np.uint64(int64_of(book, ArrayId.CHOICES, ZERO)[first + act])
     return t
 
 
 @inline
 def _open_episode(book: Any, layout: int, row: int) -> None:
     """Let the row's key and program be those of the episode that it names."""
-    key = uint64_of(book, Book.KEYS, row)
+    key = uint64_of(book, ArrayId.KEYS, row)
     key[Key.KEY] = rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE])
     first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
     count = _pool_size(key)
     if count > 1:
-        pinned = registers_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
+        pinned = registers_of(book, ArrayId.PINS, layout)[int64_of(book, ArrayId.SIZES, ZERO)[Size.REGISTERS]]
         if _plays_acts(key):
             act = ZERO if pinned == UNPINNED else pinned
             key[Key.ACT] = np.uint64(act)
@@ -100,43 +100,45 @@ def _open_episode(book: Any, layout: int, row: int) -> None:
         elif pinned != UNPINNED:
             first += pinned
         else:
-            first += draw_member(key[Key.KEY], int64_of(book, Book.WEIGHTS, first), count)
-    key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first])
+            first += draw_member(key[Key.KEY], int64_of(book, ArrayId.WEIGHTS, first), count)
+    key[Key.PROGRAM] = np.uint64(int64_of(book, ArrayId.CHOICES, ZERO)[first])
 
 
 @inline
 def _report_nothing(book: Any, row: int) -> None:
-    float64_of(book, Book.REWARD, ZERO)[row] = 0.0
-    registers_of(book, Book.OUTCOME, ZERO)[row] = -1
-    bytes_of(book, Book.TERMINATED, ZERO)[row] = 0
-    bytes_of(book, Book.TRUNCATED, ZERO)[row] = 0
-    bytes_of(book, Book.SUCCESS, ZERO)[row] = 0
-    bytes_of(book, Book.ENDED, ZERO)[row] = 0
+    float64_of(book, ArrayId.REWARD, ZERO)[row] = 0.0
+    registers_of(book, ArrayId.OUTCOME, ZERO)[row] = -1
+    bytes_of(book, ArrayId.TERMINATED, ZERO)[row] = 0
+    bytes_of(book, ArrayId.TRUNCATED, ZERO)[row] = 0
+    bytes_of(book, ArrayId.SUCCESS, ZERO)[row] = 0
+    bytes_of(book, ArrayId.ENDED, ZERO)[row] = 0
 
 
 @inline
 def _report_end(book: Any, row: int, opened: Row) -> None:
     table = opened.program[opened.program[Header.SIZE] + Link.ENDING_AT]
-    registers_of(book, Book.OUTCOME, ZERO)[row] = opened.program[table + opened.registers[Register.OUTCOME]]
+    registers_of(book, ArrayId.OUTCOME, ZERO)[row] = opened.program[
+        table + opened.registers[Register.OUTCOME]
+    ]
     success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
-    bytes_of(book, Book.SUCCESS, ZERO)[row] = np.int64(success)
-    bytes_of(book, Book.ENDED, ZERO)[row] = 1
+    bytes_of(book, ArrayId.SUCCESS, ZERO)[row] = np.int64(success)
+    bytes_of(book, ArrayId.ENDED, ZERO)[row] = 1
     if opened.registers[Register.ENDED] == TERMINATED:
-        bytes_of(book, Book.TERMINATED, ZERO)[row] = 1
+        bytes_of(book, ArrayId.TERMINATED, ZERO)[row] = 1
     else:
-        bytes_of(book, Book.TRUNCATED, ZERO)[row] = 1
+        bytes_of(book, ArrayId.TRUNCATED, ZERO)[row] = 1
 
 
 @inline
 def _actions_fit(book: Any, rows: int) -> bool:
     """Whether all actions are inside the action space."""
-    program = int32_of(book, Book.WORDS, np.int64(uint64_of(book, Book.KEYS, ZERO)[Key.PROGRAM]))
+    program = int32_of(book, ArrayId.WORDS, np.int64(uint64_of(book, ArrayId.KEYS, ZERO)[Key.PROGRAM]))
     link = program[Header.SIZE]
     primitives = np.uint64(program[link + Link.ACTIONS])
     templates = np.uint64(program[link + Link.TEMPLATES])
     slots = program[link + Link.SLOTS]
     sizes = program[link + Link.SIZE_AT]
-    actions = uint64_of(book, Book.FLAT_ACTIONS, ZERO)
+    actions = uint64_of(book, ArrayId.FLAT_ACTIONS, ZERO)
     wrong = False
     for i in range(0, (3 + slots) * rows, 3 + slots):
         # What is negative is large unsigned.
@@ -150,7 +152,7 @@ def serve(book: Any, task: int, rows: int) -> int:
     """Do a `Task` for all rows.
 
     Args:
-        book: the arrays of `Book` (`pointers.make_book`).
+        book: the arrays of `ArrayId` (`pointers.make_book`).
         task: a `Task`.
         rows: how many there are.
 
@@ -165,17 +167,17 @@ def serve(book: Any, task: int, rows: int) -> int:
         layout = ZERO
         t = ZERO
         if task == Task.RESET:
-            if bytes_of(arrays, Book.CHOSEN, ZERO)[row] == 0:
+            if bytes_of(arrays, ArrayId.CHOSEN, ZERO)[row] == 0:
                 continue
-            layout = int32_of(arrays, Book.LAYOUT, ZERO)[row]
+            layout = int32_of(arrays, ArrayId.LAYOUT, ZERO)[row]
         else:
             _report_nothing(arrays, row)
-            if registers_of(arrays, Book.REGISTERS, row)[Register.ENDED] == 0:
+            if registers_of(arrays, ArrayId.REGISTERS, row)[Register.ENDED] == 0:
                 opened = open_row(arrays, ZERO, row)
                 reward = step_row(opened, opened.program[Header.SIZE], arrays, row)
                 if reward != 0.0 and _plays_acts(opened.key):
                     reward /= np.float64(_pool_size(opened.key))
-                float64_of(arrays, Book.REWARD, ZERO)[row] = reward
+                float64_of(arrays, ArrayId.REWARD, ZERO)[row] = reward
                 if opened.registers[Register.ENDED] == 0:
                     continue
                 if _plays_acts(opened.key):
@@ -189,12 +191,12 @@ def serve(book: Any, task: int, rows: int) -> int:
             elif task != Task.STEP_NEXT:
                 continue
             if t == 0:
-                uint64_of(arrays, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
+                uint64_of(arrays, ArrayId.KEYS, row)[Key.EPISODE] += np.uint64(1)
         if t == 0:
             _open_episode(arrays, layout, row)
         fresh = open_row(arrays, layout, row)
         if not reset_row(fresh, layout != 0, t):
-            bytes_of(arrays, Book.REFUSED, ZERO)[row] = 1
+            bytes_of(arrays, ArrayId.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM
         take_picture(fresh, fresh.program[Header.SIZE], arrays, row)
     return ended

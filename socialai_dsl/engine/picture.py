@@ -12,7 +12,7 @@ from socialai_dsl.engine.entities import field, is_present, npc_at, quadrant, st
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import bytes_of, uint16_of, uint32_of
 from socialai_dsl.engine.shadows import lit_cells
-from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, ArrayId, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
 from socialai_dsl.program import CELL, LAST_ACTS, NO_GESTURE, POINTING_HERE, VIEW, Body, Field, Flag, Header
 from socialai_dsl.vocabulary import NPC
@@ -42,7 +42,7 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 def take_picture(row: Row, link: int, book: Any, number: int) -> None:
     """Write what the agent, in row `number` of the book, sees; its own cell shows what it carries, or reads empty."""
     flags = row.program[Header.FLAGS]
-    image = uint32_of(book, Book.IMAGE, number)
+    image = uint32_of(book, ArrayId.IMAGE, number)
     x = field(row, AGENT, Field.X)
     y = field(row, AGENT, Field.Y)
     if x < 0:
@@ -54,16 +54,20 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
         if flags & Flag.OCCLUSION:
             lit = lit_cells(row, x, y, field(row, AGENT, Field.DIR))
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
-        view = uint16_of(book, Book.VIEWS, row.program[link + Link.VIEWS] + pose)
+        view = uint16_of(book, ArrayId.VIEWS, row.program[link + Link.VIEWS] + pose)
         _gather(row, view, lit, image)
     if flags & Flag.CARRYING:
         carried = carried_by(row, AGENT)
         if carried != 0:
             image[OWN_PLACE] = object_look(row, carried)
     if flags & Trait.MORE:
-        _show_more(row, link, image, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
+        _show_more(
+            row, link, image, bytes_of(book, ArrayId.EXTRA, number), bytes_of(book, ArrayId.PICTURE, number)
+        )
     elif flags & (Flag.EGOCENTRIC | Trait.GESTURES):
-        _show_npcs(row, image, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
+        _show_npcs(
+            row, image, uint16_of(book, ArrayId.EXTRA, number), uint16_of(book, ArrayId.PICTURE, number)
+        )
 
 
 @inline

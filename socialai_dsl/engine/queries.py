@@ -13,7 +13,7 @@ from socialai_dsl.engine.picture import image_digest
 from socialai_dsl.engine.pointers import int64_of, registers_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
-from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
+from socialai_dsl.engine.state import STILL, ZERO, ArrayId, Link, Row, Size, Trait
 from socialai_dsl.engine.step import be_silent, begin
 from socialai_dsl.engine.turns import (
     act,
@@ -117,15 +117,15 @@ def _index_of(program: NDArray[np.int32], table: int, size: int, wanted: int) ->
 def _script_row(book: Any, row: int) -> None:
     """Write the scripted action of one row. It is played, and then everything is as it was."""
     opened = open_row(book, ZERO, row)
-    sizes = int64_of(book, Book.SIZES, ZERO)
-    registers = registers_of(book, Book.SPARE_REGISTERS, ZERO)
-    board = uint32_of(book, Book.SPARE_BOARDS, ZERO)
-    counters = int64_of(book, Book.SPARE_COUNTERS, ZERO)
+    sizes = int64_of(book, ArrayId.SIZES, ZERO)
+    registers = registers_of(book, ArrayId.SPARE_REGISTERS, ZERO)
+    board = uint32_of(book, ArrayId.SPARE_BOARDS, ZERO)
+    counters = int64_of(book, ArrayId.SPARE_COUNTERS, ZERO)
     count = opened.program[Header.COUNTERS]
     copy(registers, opened.registers, sizes[Size.REGISTERS])
     copy(board, opened.board, sizes[Size.BOARD])
     copy(counters, opened.counters, count)
-    _play(opened, opened.program[Header.SIZE], int64_of(book, Book.ACTIONS, row))
+    _play(opened, opened.program[Header.SIZE], int64_of(book, ArrayId.ACTIONS, row))
     copy(opened.registers, registers, sizes[Size.REGISTERS])
     copy(opened.board, board, sizes[Size.BOARD])
     copy(opened.counters, counters, count)
@@ -140,9 +140,9 @@ def script(book: Any, rows: int) -> int:
 
 def identify(book: Any, rows: int) -> int:
     """Write digests of the pictures of all rows."""
-    gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
+    gestures = int64_of(book, ArrayId.SIZES, ZERO)[Size.EXTRA]
     for row in range(rows):
-        uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(
-            uint32_of(book, Book.IMAGE, row), uint16_of(book, Book.EXTRA, row), gestures
+        uint64_of(book, ArrayId.IMAGE_IDS, ZERO)[row] = image_digest(
+            uint32_of(book, ArrayId.IMAGE, row), uint16_of(book, ArrayId.EXTRA, row), gestures
         )
     return 0

@@ -6,25 +6,25 @@ import numpy as np
 
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.pointers import int32_of, int64_of, registers_of, tokens_of, uint32_of, uint64_of
-from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row
+from socialai_dsl.engine.state import ZERO, ArrayId, Key, Link, Row
 from socialai_dsl.program import Header
 
 
 @inline
 def open_row(book: Any, layout: int, row: int) -> Row:
     """One environment, with the pins of a layout."""
-    key = uint64_of(book, Book.KEYS, row)
-    program = int32_of(book, Book.WORDS, np.int64(key[Key.PROGRAM]))
+    key = uint64_of(book, ArrayId.KEYS, row)
+    program = int32_of(book, ArrayId.WORDS, np.int64(key[Key.PROGRAM]))
     return Row(
         program,
-        registers_of(book, Book.REGISTERS, row),
-        uint32_of(book, Book.BOARDS, row),
+        registers_of(book, ArrayId.REGISTERS, row),
+        uint32_of(book, ArrayId.BOARDS, row),
         key,
-        tokens_of(book, Book.TOKENS, row),
-        int64_of(book, Book.COUNTERS, program[program[Header.SIZE] + Link.COUNTERS]),
-        registers_of(book, Book.PINS, layout),
-        int64_of(book, Book.SCRATCH, ZERO),
-        uint32_of(book, Book.SETS, ZERO),
+        tokens_of(book, ArrayId.TOKENS, row),
+        int64_of(book, ArrayId.COUNTERS, program[program[Header.SIZE] + Link.COUNTERS]),
+        registers_of(book, ArrayId.PINS, layout),
+        int64_of(book, ArrayId.SCRATCH, ZERO),
+        uint32_of(book, ArrayId.SETS, ZERO),
     )
 
 

@@ -94,7 +94,7 @@ class Trait(IntEnum):
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
 
 
-class Book(IntEnum):
+class ArrayId(IntEnum):
     """The arrays of `Tables`, `State` and `Ports` in the order in which a call gets them, and then one more."""
 
     WORDS = 0

@@ -12,7 +12,7 @@ from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.pointers import int64_of
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
-from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, ArrayId, Link, Row, Trait
 from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
@@ -101,7 +101,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     program = row.program
     flags = program[Header.FLAGS]
     begin(row)
-    decode(row, link, int64_of(book, Book.ACTIONS, number))
+    decode(row, link, int64_of(book, ArrayId.ACTIONS, number))
 
     frame = program[Header.FRAME_AT]
     heard = 0

@@ -9,7 +9,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema.scenario import Rule
 from socialai_dsl.semantics import slots
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, quoted, surviving
+from socialai_dsl.semantics.scope import ReportedError, Scope, quoted, surviving
 from socialai_dsl.semantics.terms import Line, numbers_of
 from socialai_dsl.semantics.texts import Alternative
 from socialai_dsl.source import DataPath
@@ -27,7 +27,7 @@ def of_slot(resolver: Resolver) -> tuple[str, tuple[int, ...]] | None:
     with surviving():
         if slot is None:
             if name in symbols.scenario.grammar.slots:
-                raise FailedError  # it cannot be filled, which has been reported
+                raise ReportedError  # it cannot be filled, which has been reported
             near = did_you_mean(name, symbols.slots)
             message = f"the grammar has no slot `{name}`"
             suggestion = f"<{near}>" if near else None

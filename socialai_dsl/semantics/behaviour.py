@@ -31,8 +31,8 @@ from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
     KEY,
     Draws,
-    FailedError,
     PlayedFrame,
+    ReportedError,
     Scalar,
     Scope,
     described,
@@ -113,7 +113,7 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
 
 def _unknown(
     resolver: Resolver, name: str, args: tuple[ast.Expr, ...], node: ast.Expr, scope: Scope
-) -> FailedError:
+) -> ReportedError:
     given = f"({', '.join(map(quoted, args))})" if args else ""
     synonym = SYNONYMS.get(name)
     if synonym:
@@ -276,7 +276,7 @@ class _Deeds:
             self.register(scope.path, key.partition("(")[0].strip()) if look is None else f"looks.{look}"
         )
         if register not in resolver.registers:
-            raise FailedError  # its group means nothing, which has been reported
+            raise ReportedError  # its group means nothing, which has been reported
         if isinstance(node, ast.Call) and len(node.args) == 1 and those.found(node.args[0]):
             yield from those.assigned(resolver, register, node, raw, scope, own)
             return
@@ -527,7 +527,7 @@ class _Planner:
         findings, horizon = self.resolver.findings, self.resolver.symbols.scenario.horizon
         try:
             term = self.resolver.written(raw, INT, self._scope(path, site))  # type: ignore[arg-type]
-        except FailedError:
+        except ReportedError:
             return None, None
         if isinstance(term, Const):
             if 0 <= term.value <= horizon:

@@ -52,9 +52,9 @@ from socialai_dsl.semantics.resolver import (
     words_of_values,
 )
 from socialai_dsl.semantics.scope import (
-    FailedError,
     Findings,
     PlayedFrame,
+    ReportedError,
     Scalar,
     frames_of,
     step_scope,
@@ -108,7 +108,7 @@ def properties(
             written, before = _Entry(resolver, entry, ("check", i)), [*bag]
             try:
                 yield written.plan(outcomes, lets)
-            except FailedError:
+            except ReportedError:
                 found = [d for d in bag if d not in before]
                 if not found or patches is None or any(d.span.file in patches for d in found):
                     raise
@@ -129,7 +129,7 @@ def _let(resolver: Resolver, path: DataPath, word: str, lets: Collection[str]) -
     findings = resolver.findings
     if f"let.{word}" not in lets:
         if word in resolver.symbols.scenario.let and findings.bag.has_errors:
-            raise FailedError  # its value means nothing, which has been reported
+            raise ReportedError  # its value means nothing, which has been reported
         near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
         message = f"`{word}` is not drawn in `let`"
         raise findings.no_such(word, message, findings.at(path, width=len(word)), suggestion=near)

@@ -8,7 +8,7 @@ from typing import Final
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.resolver import INT, SAYABLE, Resolver, same_kind
-from socialai_dsl.semantics.scope import Draws, FailedError, Scope, common_type, described, quoted, spoken
+from socialai_dsl.semantics.scope import Draws, ReportedError, Scope, common_type, described, quoted, spoken
 from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
@@ -49,11 +49,11 @@ def conditional(resolver: Resolver, node: ast.Conditional, expected: Type | None
             asked = rest.condition if isinstance(rest, ast.Conditional) else None
             condition = resolver.value(asked, BOOL, scope) if asked is not None else None
             branches.append(_Branch(chosen, value, condition))
-        except FailedError:
+        except ReportedError:
             failed = True  # the others may have mistakes of their own
         rest = rest.other if isinstance(rest, ast.Conditional) else None
     if failed:
-        raise FailedError
+        raise ReportedError
     return _taken(_of_one_type(resolver, node, branches, scope))
 
 

@@ -20,7 +20,7 @@ from socialai_dsl.semantics.plans import (
 )
 from socialai_dsl.semantics.probes import NotedValues
 from socialai_dsl.semantics.resolver import Resolver
-from socialai_dsl.semantics.scope import FailedError, step_scope, surviving
+from socialai_dsl.semantics.scope import ReportedError, step_scope, surviving
 from socialai_dsl.semantics.terms import BOOL, SitedTerm
 from socialai_dsl.semantics.texts import ANYTHING
 from socialai_dsl.semantics.typed import STANDING, Phrases, split_line
@@ -76,7 +76,7 @@ class _Test:
         with self._surviving():
             self._check_number()
         if not self._fine:
-            raise FailedError
+            raise ReportedError
         return DialoguePlan(
             self._name,
             places.key_span(self._path),
@@ -92,7 +92,7 @@ class _Test:
         """Go on after a value that failed, to find the other mistakes of the test."""
         try:
             yield
-        except FailedError:
+        except ReportedError:
             self._fine = False
 
     # -- the room, the end ---------------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ class _Test:
     def _act(self, path: DataPath, typed: str) -> tuple[int, ...]:
         """What is typed, as an action of the space."""
         if not self._findings.must_be_one_line(path, typed):
-            raise FailedError
+            raise ReportedError
         typed = typed.strip()
         actions = self._resolver.symbols.scenario.actions
         action, said = split_line(typed, PRIMITIVES)

@@ -27,10 +27,10 @@ from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Declaration, 
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
-    FailedError,
     Findings,
     Objects,
     PlayedFrame,
+    ReportedError,
     Scope,
     Symbols,
     dotted,
@@ -448,7 +448,7 @@ def _declare_register(
     if raw.for_ is not None:
         try:
             keys = rows.keys(resolver, (*path, "for"), raw.for_)
-        except FailedError:
+        except ReportedError:
             return
     start = (*path, "start")
     scope = scope.at(start, scope.draws.site)

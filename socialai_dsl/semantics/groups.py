@@ -15,8 +15,8 @@ from socialai_dsl.semantics.plans import MemoryPlan
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
     Draws,
-    FailedError,
     Macro,
+    ReportedError,
     Scope,
     described,
     quoted,
@@ -201,7 +201,7 @@ def _alternatives(
         expected = group(resolver, lead, None, scope).type
     items: list[Const] = []
     for weight, option in parts:
-        members = group(resolver, option, opened(expected), scope)
+        members = group(resolver, option, of_any_range(expected), scope)
         if members.bounds is not None:
             raise resolver.fail(
                 "S204", f"the ends of `{quoted(option)}` are not known numbers", option, scope
@@ -210,7 +210,7 @@ def _alternatives(
     return _joined(resolver, node, items, scope)
 
 
-def opened(expected: Type | None) -> Type | None:
+def of_any_range(expected: Type | None) -> Type | None:
     """What is expected of the members of a group: numbers and things of any range."""
     if expected is not None and expected.kind in ("int", "entity") and not expected.words:
         return replace(expected, low=0, high=0)
@@ -269,12 +269,12 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
         raise resolver.fail("S211", message, node, scope, hint=hint)
     chooses = node.name in ("pick", "first", "nearest")
     ordinal = scope.draws.number() if node.name == "pick" else 0
-    members = group(resolver, node.group, opened(expected) if chooses else None, scope)
-    variable = named(node.var, scope)
+    members = group(resolver, node.group, of_any_range(expected) if chooses else None, scope)
+    variable = variable_called(node.var, scope)
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
     to = resolver.somewhere(node.to, scope) if node.to is not None else None
-    return made(cast(Quantifier, node.name), members, variable, condition, scope, ordinal, to)
+    return quantification(cast(Quantifier, node.name), members, variable, condition, scope, ordinal, to)
 
 
 def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> None:
@@ -320,11 +320,13 @@ def check_quantifier(resolver: Resolver, node: ast.Quantifier, scope: Scope) -> 
 def pick(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
     """`pick(group)` and `first(group)`, `count(group)`: without a condition."""
     ordinal = scope.draws.number() if node.name == "pick" else 0
-    members = group(resolver, node.args[0], opened(expected) if node.name != "count" else None, scope)
-    return made(cast(Quantifier, node.name), members, named("each", scope), None, scope, ordinal)
+    members = group(resolver, node.args[0], of_any_range(expected) if node.name != "count" else None, scope)
+    return quantification(
+        cast(Quantifier, node.name), members, variable_called("each", scope), None, scope, ordinal
+    )
 
 
-def made(
+def quantification(
     op: Quantifier,
     members: Group,
     variable: str,
@@ -357,12 +359,12 @@ def any_member(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Calla
             f"`{quoted(node)}` is {described(members.type)}, here somebody or something in the room is needed"
         )
         raise resolver.fail("S204", message, node, scope)
-    variable = named("each", scope)
+    variable = variable_called("each", scope)
     condition = relation(Variable(members.type, variable))
-    return made("any", members, variable, condition, scope)
+    return quantification("any", members, variable, condition, scope)
 
 
-def named(word: str, scope: Scope) -> str:
+def variable_called(word: str, scope: Scope) -> str:
     """The name of a variable, which differs from those around it."""
     return f"{word}#{scope.nested}" if scope.nested else word
 
@@ -499,7 +501,7 @@ def _written(resolver: Resolver, raw: object) -> frozenset[int]:
         return _ALL_COLORS
     try:
         return _values_named(resolver, resolver.findings.expression((), raw))
-    except FailedError:
+    except ReportedError:
         return _ALL_COLORS  # which is reported where it is resolved
 
 
@@ -617,7 +619,7 @@ def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Act
     """The sequence that fills a slot, the same in all cases."""
     findings, cases = resolver.findings, resolver.symbols.cast[member].filling(slot)
     if looked_at or cases is None:
-        raise FailedError  # a slot that nobody fills is reported where it is left empty
+        raise ReportedError  # a slot that nobody fills is reported where it is left empty
     found: list[ActSequence] = []
     for case in cases:
         node = findings.expression(case.path, case.raw)
@@ -650,7 +652,7 @@ def same(resolver: Resolver, left: ActSequence, right: ActSequence, node: ast.Co
     return all_of([*full, *(Compare("==", a, b) for a, b in pairs)])
 
 
-def incomparable(resolver: Resolver, node: ast.Compare, left: bool, scope: Scope) -> FailedError:
+def incomparable(resolver: Resolver, node: ast.Compare, left: bool, scope: Scope) -> ReportedError:
     """Only one side of a comparison, the left or the right one, is a sequence or memory; reports what is wrong."""
     acts, other = (node.left, node.right) if left else (node.right, node.left)
     if not is_group(resolver, other, scope):

@@ -8,7 +8,7 @@ from socialai_dsl import cures
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, quoted, with_article
+from socialai_dsl.semantics.scope import ReportedError, Scope, quoted, with_article
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
@@ -83,13 +83,13 @@ def carried(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term
     members = groups.Group(type_, tuple(Const(type_, number) for number in numbers))
     name = f"carried#{scope.nested}"
     condition = _in_hands(resolver, who, Variable(type_, name))
-    return groups.made("first", members, name, condition, scope)
+    return groups.quantification("first", members, name, condition, scope)
 
 
-def nothing_carried(resolver: Resolver, message: str, span: Span) -> FailedError:
+def nothing_carried(resolver: Resolver, message: str, span: Span) -> ReportedError:
     """Report that nothing can be carried, once: all that is asked of hands then fails for the same reason."""
     if "carryable" in resolver.reported:
-        return FailedError()
+        return ReportedError()
     resolver.reported.add("carryable")
     return resolver.findings.fail("S204", message, span, hint=CARRYABLE)
 

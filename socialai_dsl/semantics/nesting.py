@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from socialai_dsl.schema.scenario import Step
 from socialai_dsl.semantics.plans import NestedSteps, StepPlan
 from socialai_dsl.semantics.resolver import INT, Resolver
-from socialai_dsl.semantics.scope import Draws, FailedError, PlayedFrame, Scope, dotted
+from socialai_dsl.semantics.scope import Draws, PlayedFrame, ReportedError, Scope, dotted
 from socialai_dsl.semantics.terms import Const, SitedTerm
 from socialai_dsl.source import DataPath
 
@@ -62,7 +62,7 @@ class NestedPlanner:
         scope = Scope(path, draws, member=self.played.member, frame=self.played)
         try:
             term = self.resolver.written(raw, INT, scope)  # type: ignore[arg-type]
-        except FailedError:
+        except ReportedError:
             return 1
         if isinstance(term, Const) and 0 <= term.value <= horizon:
             return term.value

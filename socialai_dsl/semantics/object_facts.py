@@ -16,8 +16,8 @@ from socialai_dsl.semantics.cast import fillings, members
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, ComputedStatus, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import (
-    FailedError,
     Objects,
+    ReportedError,
     Scope,
     Symbols,
     frames_of,
@@ -262,7 +262,7 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
     numbers = numbers_of(who)
     for lock in numbers:
         if lock not in found and _some_failed(resolver):
-            raise FailedError  # perhaps it is what that one was to unlock
+            raise ReportedError  # perhaps it is what that one was to unlock
         if lock not in found:
             message = f"nothing unlocks `{resolver.symbols.called(lock)}`"
             hint = "an object unlocks another with `unlocks:`"
@@ -484,13 +484,13 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
         known = resolver.symbols.cast[member].value("beliefs") or {}
         if node.name not in known:
             if member == scope.member and scope.frame is not None and scope.frame.looked_at:
-                raise FailedError  # who believes it plays this frame elsewhere
+                raise ReportedError  # who believes it plays this frame elsewhere
             hint = f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"
             raise resolver.no_such(node.name, message, node, scope, **advice_on(node.name, known, hint))
     if any(register_of(str(member), node.name) not in resolver.registers for member in members):
-        raise FailedError  # what it starts with is missing, which has been reported
+        raise ReportedError  # what it starts with is missing, which has been reported
     return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])
 
 

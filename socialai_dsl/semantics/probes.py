@@ -10,7 +10,7 @@ from socialai_dsl.schema.scenario import Expression, Probe
 from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.resolver import Resolver
-from socialai_dsl.semantics.scope import FailedError, spoken, step_scope, surviving
+from socialai_dsl.semantics.scope import ReportedError, spoken, step_scope, surviving
 from socialai_dsl.semantics.terms import BOOL, SitedTerm, Term
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
@@ -123,7 +123,7 @@ class _Entry:
             answer = self._answer()
             answers = tuple(self._answers(answer))
         if not fine or ask is None or answers is None:
-            raise FailedError
+            raise ReportedError
         return when, ask, answer, answers
 
     def _answer(self) -> Drawn:

@@ -15,7 +15,7 @@ from socialai_dsl.semantics.resolve_names import synonym_of, without_arguments
 from socialai_dsl.semantics.resolver import INT, WORDED, Resolver, same_kind, text_value
 from socialai_dsl.semantics.scope import (
     Draws,
-    FailedError,
+    ReportedError,
     Scope,
     described,
     quoted,
@@ -100,7 +100,7 @@ def _definition(resolver: Resolver, node: ast.Call, scope: Scope) -> tuple[Any, 
     return define, dict(zip(define.parameters, node.args, strict=True))
 
 
-def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> FailedError:
+def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> ReportedError:
     if node.name in ACTIVITIES or node.name in EFFECTS or node.name in PLACES:
         kind = (
             "an activity" if node.name in ACTIVITIES else "an effect" if node.name in EFFECTS else "a place"
@@ -182,10 +182,10 @@ class ScenarioResolver(Resolver):
         for operand in node.operands:
             try:
                 operands.append(self.value(operand, BOOL, scope))
-            except FailedError:
+            except ReportedError:
                 failed = True  # the others may have mistakes of their own
         if failed:
-            raise FailedError
+            raise ReportedError
         return all_of(operands) if node.op == "and" else any_of(operands)
 
     def _comparison(self, node: ast.Compare, scope: Scope) -> Term:
@@ -387,10 +387,10 @@ def _both_hold(left: Term, right: Term) -> Term:
 
 def _asked_for(*sides: Term) -> list[Term]:
     """Conditions that ask for what has to be there, and hold where it is."""
-    return [Compare("==", side, side) for side in sides if _has_to_be_there(side)]
+    return [Compare("==", side, side) for side in sides if _fails_if_missing(side)]
 
 
-def _has_to_be_there(term: Term) -> bool:
+def _fails_if_missing(term: Term) -> bool:
     """Whether a term may find nothing, and with it the whole condition; of a register that is its key."""
     if isinstance(term, ReadEach):
         return term.may_miss or may_find_nothing(term.key)

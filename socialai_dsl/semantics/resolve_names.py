@@ -18,9 +18,9 @@ from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
-    FailedError,
     Macro,
     PlayedFrame,
+    ReportedError,
     Scope,
     as_text,
     described,
@@ -82,7 +82,7 @@ def without_arguments(
 
 def _unknown_attribute(
     resolver: Resolver, name: str, signature: Signature | None, node: ast.Expr, scope: Scope
-) -> FailedError:
+) -> ReportedError:
     if signature is not None:
         return resolver.fail(
             "S211", f"`{name}` needs something in brackets: `{usage(signature)}`", node, scope
@@ -197,7 +197,7 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
     if word not in frame.model.let and word not in frame.model.slots:
         return None
     if frame.register(word) not in resolver.registers:
-        raise FailedError  # a slot that nobody fills, which is reported where it is left empty
+        raise ReportedError  # a slot that nobody fills, which is reported where it is left empty
     return single(resolver, frame.register(word), expected, node, scope)
 
 
@@ -237,7 +237,7 @@ def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope
     """The condition that fills a slot of type bool: in one of its cases it is true."""
     filled = frame.texts[slot]
     if filled is None:
-        raise FailedError  # nobody fills it, which is reported where it is left empty
+        raise ReportedError  # nobody fills it, which is reported where it is left empty
     cases = grouped(filled)
     scopes = (with_scope(case.path, frame.member, slot, scope) for case in cases)
     truths = [slot_truth(resolver, slot, case.raw, own) for case, own in zip(cases, scopes, strict=True)]
@@ -272,7 +272,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
         raise _not_a_value(resolver, "memory" if word in symbols.scenario.memory else "sequence", node, scope)
     if word in symbols.scenario.state:
         if f"state.{word}" not in resolver.registers:
-            raise FailedError  # its group means nothing, which has been reported
+            raise ReportedError  # its group means nothing, which has been reported
         return single(resolver, f"state.{word}", expected, node, scope)
     if word in symbols.scenario.looks:
         return rows.look(resolver, word, node, scope)
@@ -304,14 +304,14 @@ def _player(resolver: Resolver, role: str) -> str:
         return symbols.roles[role]
     given = [member.role for member in symbols.scenario.cast.values() if member.role is not None]
     if not set(given) <= symbols.scenario.roles.keys() or len(set(given)) < len(given):
-        raise FailedError  # a role that is given wrongly, which has been reported, may be this one
+        raise ReportedError  # a role that is given wrongly, which has been reported, may be this one
     # Said once, where the role is declared: it may be spoken of in many places.
     span = resolver.findings.places.key_span(("roles", role))
     hint = f"add `role: {role}` to a member of the cast"
     raise resolver.findings.no_such(role, f"nobody plays the role `{role}`", span, hint=hint)
 
 
-def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> FailedError:
+def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> ReportedError:
     use = "compared with a sequence" if kind == "memory" else "performed, or compared with a memory"
     message = f"`{node.id}` is a {kind}; it can only be {use}"
     return resolver.fail("S204", message, node, scope)
@@ -378,7 +378,7 @@ def _word(word: str, expected: Type | None) -> Term | None:
     return None
 
 
-def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> FailedError:
+def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> ReportedError:
     word = node.id
     if word == "here":
         return resolver.fail(

@@ -18,10 +18,10 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.cast import Cases
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
-    FailedError,
     FilledSlot,
     Findings,
     PlayedFrame,
+    ReportedError,
     Scalar,
     Scope,
     Symbols,
@@ -308,7 +308,7 @@ class Registers:
         resolved now.
         """
         for path in self._declared:
-            with suppress(FailedError):
+            with suppress(ReportedError):
                 self.read(path)
         kept = [path for path, declaration in self._declared.items() if not declaration.imagined]
         put = [path for path in self._resolved if path not in self._declared]
@@ -329,7 +329,7 @@ class Registers:
             self._resolve(declaration)
         term = self._resolved[path].term
         if term is None:
-            raise FailedError
+            raise ReportedError
         return term
 
     def keys(self, path: str) -> tuple[Const, ...]:
@@ -358,7 +358,7 @@ class Registers:
             return False
         try:
             node = self._resolver.findings.expression(declaration.source, declaration.raw)
-        except FailedError:
+        except ReportedError:
             return False
         return self._resolver.is_wordy(node, declaration.scope)
 
@@ -501,7 +501,7 @@ class Registers:
             raise findings.fail("S106", message, findings.at(declaration.source))
         return given
 
-    def _circle(self, path: str) -> FailedError:
+    def _circle(self, path: str) -> ReportedError:
         circle = [self._declared[p] for p in self._busy[self._busy.index(path) :]]
         labels = [d.label for d in circle]
         needs = " and ".join(
@@ -599,7 +599,7 @@ class Resolver(ABC):
         """The term for a tree by what kind of node it is; `value` keeps how it was written as well."""
 
     def written(self, raw: Scalar | Cases, expected: Type | None, scope: Scope) -> Term:
-        """The value that is written at the scope's path, or has these cases; raises FailedError once it is reported."""
+        """The value that is written at the scope's path, or has these cases; ReportedError once it is reported."""
         if isinstance(raw, tuple):
             values = [self.written(one.raw, expected, scope.at(one.path, scope.draws.site)) for one in raw]
             return select(raw, values)
@@ -659,7 +659,7 @@ class Resolver(ABC):
 
     def fail(
         self, code: str, message: str, node: ast.Expr, scope: Scope, **more: Unpack[Advice]
-    ) -> FailedError:
+    ) -> ReportedError:
         """Report what is wrong with a part of an expression; raising the result gives the expression up."""
         return self.findings.fail(code, message, self.findings.node(scope.path, node), **more)
 
@@ -685,7 +685,7 @@ class Resolver(ABC):
 
     def no_such(
         self, word: str, message: str, node: ast.Expr, scope: Scope, **more: Unpack[Advice]
-    ) -> FailedError:
+    ) -> ReportedError:
         """Report a name in an expression that means nothing there."""
         return self.findings.no_such(word, message, self.findings.node(scope.path, node), **more)
 

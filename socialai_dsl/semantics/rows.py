@@ -14,7 +14,7 @@ from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import LookPlan
 from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver
 from socialai_dsl.semantics.scope import (
-    FailedError,
+    ReportedError,
     Scope,
     of_each,
     quoted,
@@ -75,7 +75,9 @@ def of_keys(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> list
     if len(node.args) != 1 or not groups.is_group(resolver, node.args[0], scope):
         return [of_key(resolver, path, node, scope)]
     known = resolver.registers.keys(path)
-    members = groups.group(resolver, node.args[0], groups.opened(known[0].type) if known else None, scope)
+    members = groups.group(
+        resolver, node.args[0], groups.of_any_range(known[0].type) if known else None, scope
+    )
     if not known or members.bounds is not None or not {*members.items} <= {*known}:
         return [of_key(resolver, path, node, scope)]  # which says what is wrong
     return [resolver.registers.of_key(path, key) for key in dict.fromkeys(members.items)]
@@ -85,7 +87,7 @@ def of_key(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> Read 
     """The register of the key in brackets; what has none for sure is a mistake."""
     registers, symbols = resolver.registers, resolver.symbols
     if path not in registers:
-        raise FailedError  # its group means nothing, which has been reported
+        raise ReportedError  # its group means nothing, which has been reported
     known = registers.keys(path)
     if not known:
         message = f"there is one `{node.name}`, so it takes nothing in brackets"
@@ -94,7 +96,7 @@ def of_key(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> Read 
     if len(node.args) != 1:
         message = f"`{node.name}` takes one key: `{node.name}({example(resolver, path)})`"
         raise resolver.fail("S211", message, node, scope)
-    key = resolver.value(node.args[0], groups.opened(known[0].type), scope)
+    key = resolver.value(node.args[0], groups.of_any_range(known[0].type), scope)
     possible = numbers_of(key)  # of a wide range not one by one
     if not any(each.value in possible for each in known):
         first, last = symbols.word(known[0]), symbols.word(known[-1])
@@ -181,7 +183,7 @@ def looks(resolver: Resolver, name: str, node: ast.Expr, scope: Scope, several: 
     bearers = _bearers(resolver, name, node, scope, several)
     registers, path = resolver.registers, f"looks.{name}"
     if path not in registers:
-        raise FailedError  # its group means nothing, which has been reported
+        raise ReportedError  # its group means nothing, which has been reported
     known = {key.value for key in registers.keys(path)}
     found: list[Term] = []
     for who in bearers:

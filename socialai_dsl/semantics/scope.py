@@ -53,7 +53,7 @@ _BREAK: Final = re.compile(r"[\t\n\r]")
 """What ends a line, or moves what follows."""
 
 
-class FailedError(Exception):
+class ReportedError(Exception):
     """A value that means nothing; the reason has been reported."""
 
 
@@ -125,22 +125,22 @@ class Findings:
 
     def too_large(
         self, what: str, far: int, span: Span, when: str = "", **more: Unpack[Advice]
-    ) -> FailedError:
+    ) -> ReportedError:
         """Report a number that nothing can keep; raising the result gives up the value it is in."""
         number = f"{far:,}" if abs(far) < _EXACTLY else f"{far:.1e}"
         limit = LARGEST_NUMBER if far > 0 else -LARGEST_NUMBER
         message = f"{what} can be {number}{when}, and numbers go {'up' if far > 0 else 'down'} to {limit:,}"
         return self.fail("S106", message, span, **more)
 
-    def no_such(self, word: str, message: str, span: Span, **more: Unpack[Advice]) -> FailedError:
+    def no_such(self, word: str, message: str, span: Span, **more: Unpack[Advice]) -> ReportedError:
         """Report a name that means nothing there."""
         self.unknown.add(word)
         return self.fail("S201", message, span, **more)
 
-    def fail(self, code: str, message: str, span: Span, **more: Unpack[Advice]) -> FailedError:
+    def fail(self, code: str, message: str, span: Span, **more: Unpack[Advice]) -> ReportedError:
         """Report an error; raising the result gives up the value it is in."""
         self.bag.error(code, message, span, **more)
-        return FailedError()
+        return ReportedError()
 
     def expression(self, path: DataPath, raw: Scalar) -> ast.Expr:
         """The tree of the expression at `path`, its parameters replaced by their values."""
@@ -158,7 +158,7 @@ class Findings:
     def text(self, path: DataPath, raw: str) -> ast.Text:
         """The tree of the text at `path`, its parameters replaced by their values."""
         if not self.must_be_one_line(path, raw):
-            raise FailedError
+            raise ReportedError
         try:
             filled = self._filled(parse_text(raw), path)
         except ParseProblem as problem:
@@ -184,7 +184,7 @@ class Findings:
         self.error("S405", message, self.at(path, match.start()), hint=hint)
         return False
 
-    def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
+    def _problem(self, problem: ParseProblem, path: DataPath) -> ReportedError:
         code = "S212" if problem.code == "S004" else problem.code
         hint: cures.Hint = problem.hint
         held = held_at(Scenario, path)
@@ -257,7 +257,7 @@ def as_text(text: str, whole: object) -> str:
 
 def surviving() -> suppress:
     """Go on after a value that failed; its reason has been reported."""
-    return suppress(FailedError)
+    return suppress(ReportedError)
 
 
 def is_nothing(raw: object) -> bool:

@@ -17,9 +17,9 @@ from socialai_dsl.semantics.facts import What, entities_of, needs
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
-    FailedError,
     Findings,
     Objects,
+    ReportedError,
     Scope,
     object_scope,
     quoted,
@@ -136,7 +136,7 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
     raise resolver.fail("S204", f"`{quoted(node)}` is not a place", node, scope, hint=hint)
 
 
-def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
+def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> ReportedError:
     advice = advice_on(name, PLACES, "places are " + ", ".join(PLACES))
     return resolver.fail("S205", f"unknown place `{name}`", node, scope, **advice)
 
@@ -174,7 +174,7 @@ def room_sizes(scenario: Scenario, findings: Findings) -> tuple[Sizes, Sizes]:
 def _range(findings: Findings, path: DataPath, raw: Expression) -> Sizes:
     try:
         low, high = _bounds(findings.expression(path, raw))
-    except FailedError:
+    except ReportedError:
         return _ASSUMED
     except ValueError:
         findings.error(
@@ -549,7 +549,7 @@ class _Sorter:
         if key in self._path:
             circle = self._path[self._path.index(key) :]
             if self._circular & set(circle):
-                raise FailedError  # the same circle, entered elsewhere
+                raise ReportedError  # the same circle, entered elsewhere
             self._circular |= set(circle)
             raise self._circle([*circle, key])
         self._path.append(key)
@@ -561,7 +561,7 @@ class _Sorter:
             self._path.pop()
         self._done[key] = self._items[key]
 
-    def _circle(self, keys: list[str]) -> FailedError:
+    def _circle(self, keys: list[str]) -> ReportedError:
         names = [self._called(key) for key in keys]
         message = " and ".join(f"{a} needs {b}" for a, b in pairwise(names))
         item = self._items[keys[0]][0]

@@ -9,7 +9,7 @@ from socialai_dsl.semantics.groups import WIDE, values_of
 from socialai_dsl.semantics.resolver import ANY_TEXT, Resolver
 from socialai_dsl.semantics.scope import (
     KEY,
-    FailedError,
+    ReportedError,
     Scope,
     described,
     quoted,
@@ -89,7 +89,7 @@ def _no_key(
     key: Term,
     node: ast.Expr,
     scope: Scope,
-) -> FailedError:
+) -> ReportedError:
     """What is looked up, or what it can be, is not in the table."""
     near = did_you_mean(word, keys)
     if isinstance(key, Const):
@@ -97,7 +97,7 @@ def _no_key(
         message = f"the table `{name}` has no `{word}`"
         return resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
     if (name, word) in resolver.missing_keys:
-        return FailedError()  # wherever else it is looked up, that is no other mistake
+        return ReportedError()  # wherever else it is looked up, that is no other mistake
     resolver.missing_keys.add((name, word))
     message = f"`{quoted(node)}` can be {word}, which the table `{name}` does not have"
     hint = f"it has `{near}`; is that meant?" if near else "it has " + ", ".join(keys)
@@ -105,14 +105,14 @@ def _no_key(
 
 
 def table(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-    """Keys and values of a table; raises FailedError once what is wrong with it has been reported."""
+    """Keys and values of a table; raises ReportedError once what is wrong with it has been reported."""
     if name not in resolver.tables:
         resolver.tables[name] = None
         with surviving():
             resolver.tables[name] = _resolved(resolver, name)
     found = resolver.tables[name]
     if found is None:
-        raise FailedError
+        raise ReportedError
     return found
 
 
@@ -134,7 +134,7 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
     if isinstance(raw, str):
         text = raw.strip()
         if not resolver.findings.must_be_one_line(path, text):
-            raise FailedError
+            raise ReportedError
         if is_plain(text, "'-") or not text.strip(" '-"):
             return text
     term = resolver.written(raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]

@@ -26,7 +26,7 @@ from socialai_dsl.semantics.resolver import (
 )
 from socialai_dsl.semantics.scope import (
     Draws,
-    FailedError,
+    ReportedError,
     Scope,
     described,
     is_nothing,
@@ -131,7 +131,7 @@ def text_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[Filling]
         return None
     cases = frame.texts.get(name)
     if cases is None:
-        raise FailedError  # nobody fills it, which is reported where it is left empty
+        raise ReportedError  # nobody fills it, which is reported where it is left empty
     return [
         Filling(frame.member, name, case, resolver.findings.text(case.path, str(case.raw)))
         for case in grouped(cases)
@@ -269,7 +269,7 @@ def _report_unsayable(
     findings = resolver.findings
     said, word = unsayable[0]
     if resolver.utterances.may_be_said(said, None if from_npcs else {"agent"}):
-        raise FailedError
+        raise ReportedError
     if values and some:
         node, value = values[0]
         name = quoted(node) if not isinstance(node, str) else node
@@ -311,7 +311,7 @@ def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
     try:
         text = findings.text(path, raw)
         return _line(resolver, path, text, scope)
-    except FailedError:
+    except ReportedError:
         if scope.member != "agent":
             resolver.utterances.add_unclear(scope.member, text.parts if text is not None else [None])
         raise
@@ -394,7 +394,7 @@ def _agents(resolver: Resolver, line: Line) -> Line:
     if unsayable:
         said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
         if resolver.utterances.may_be_said(said, {"agent"}):
-            raise FailedError
+            raise ReportedError
         message = f'the agent cannot say "{said}" with this grammar'
         if len(unsayable) < len(texts) and any(_may_change(resolver, value) for value in values):
             hint = "then it says nothing; give the register a range, or the grammar the noun"
@@ -618,10 +618,10 @@ def _sayable(resolver: Resolver, members: Iterable[str]) -> list[str]:
     return list(texts)
 
 
-def _never_said(resolver: Resolver, said: str, members: Iterable[str], span: Span) -> FailedError:
+def _never_said(resolver: Resolver, said: str, members: Iterable[str], span: Span) -> ReportedError:
     members = list(members)
     if resolver.utterances.may_be_said(said.strip('"'), members):
-        return FailedError()
+        return ReportedError()
     texts, names = _sayable(resolver, members), [f"`{member}`" for member in members]
     near = did_you_mean(said.strip('"'), texts)
     hint = "what somebody can say stands in the `say` of its frame"

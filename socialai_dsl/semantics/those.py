@@ -47,7 +47,7 @@ def members(
     """The members of the group, each with its condition."""
     groups.check_quantifier(resolver, node, scope)
     known = groups.group(resolver, node.group, expected, scope)
-    name = groups.named(node.var, scope)
+    name = groups.variable_called(node.var, scope)
     variable = Variable(known.type, name)
     inner = replace(scope.binding(node.var, variable), nested=scope.nested + 1)
     assert node.where is not None, "internal: `those` has a condition"
@@ -108,7 +108,7 @@ def assigned(
     those = found(node.args[0])
     assert those is not None, "internal: the key is `those(...)`"
     known = resolver.registers.keys(register)
-    expected = groups.opened(known[0].type) if known else None
+    expected = groups.of_any_range(known[0].type) if known else None
     chosen = members(resolver, those, expected, own)
     if strangers := [one.item for one in chosen if not _among(one.item, known)]:
         name = resolver.symbols.word(strangers[0])

@@ -12,7 +12,7 @@ from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.plans import Activity
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import FailedError, Macro, Scope, quoted, with_article
+from socialai_dsl.semantics.scope import Macro, ReportedError, Scope, quoted, with_article
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -73,7 +73,9 @@ class Doing:
             hint = f"`{self.word.name}(nearest(d in {group} to self){more})`, or draw one in `let` with `pick({group})`"
             raise self.fail("S204", f"`{group}` is a group: say which of them", node, hint=hint)
 
-    def fail(self, code: str, message: str, node: ast.Expr | None = None, **more: str | None) -> FailedError:
+    def fail(
+        self, code: str, message: str, node: ast.Expr | None = None, **more: str | None
+    ) -> ReportedError:
         """Report what is wrong with it, or with a part of it; raising the result gives it up."""
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 

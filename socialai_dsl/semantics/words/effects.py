@@ -9,7 +9,7 @@ from typing import Final
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import hands, object_facts
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, quoted
+from socialai_dsl.semantics.scope import ReportedError, Scope, quoted
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import Const, Term
 from socialai_dsl.semantics.words.statuses import status_of
@@ -32,7 +32,9 @@ class Caused:
     args: tuple[ast.Expr, ...]
     scope: Scope
 
-    def fail(self, code: str, message: str, node: ast.Expr | None = None, **more: str | None) -> FailedError:
+    def fail(
+        self, code: str, message: str, node: ast.Expr | None = None, **more: str | None
+    ) -> ReportedError:
         """Report what is wrong with it, or with a part of it; raising the result gives it up."""
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 

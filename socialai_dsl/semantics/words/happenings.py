@@ -9,7 +9,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups, texts
 from socialai_dsl.semantics.groups import must_be_agent
 from socialai_dsl.semantics.resolver import ENTITY
-from socialai_dsl.semantics.scope import FailedError, of_each, quoted
+from socialai_dsl.semantics.scope import ReportedError, of_each, quoted
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -151,7 +151,7 @@ def _in_state(use: Use, member: str | None, called: str | None) -> Term:
     own = use.scope.frame if called is None else None
     frame = own or use.resolver.frames.get(member)
     if frame is None and use.resolver.symbols.cast[member].value("frame") is not None:
-        raise FailedError  # an unknown frame is reported where it is named
+        raise ReportedError  # an unknown frame is reported where it is named
     if frame is None:
         raise use.fail("S310", f"`{called or member}` follows no frame, so it has no states")
     states = list(frame.model.states or ())
@@ -170,7 +170,7 @@ def _in_state(use: Use, member: str | None, called: str | None) -> Term:
     return InState(member, frame.name, state)
 
 
-def _nobody(use: Use) -> FailedError:
+def _nobody(use: Use) -> ReportedError:
     return use.fail("S211", "a member of the cast is needed before the dot")
 
 

@@ -10,7 +10,7 @@ from socialai_dsl.diagnostics import Advice
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope
+from socialai_dsl.semantics.scope import ReportedError, Scope
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import Term, Type
 
@@ -58,7 +58,7 @@ class Use:
 
     def fail(
         self, code: str, message: str, node: ast.Expr | None = None, **more: Unpack[Advice]
-    ) -> FailedError:
+    ) -> ReportedError:
         """Report what is wrong with it, or with a part of it; raising the result gives it up."""
         return self.resolver.fail(code, message, node or self.node, self.scope, **more)
 

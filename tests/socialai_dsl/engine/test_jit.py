@@ -23,8 +23,8 @@ import numpy as np
 from socialai_dsl.engine.jit import load
 from socialai_dsl.engine.pointers import make_book
 from socialai_dsl.engine.queries import identify
-from socialai_dsl.engine.state import Book
-arrays = [np.full((1, 64), 7, np.int64)] * len(Book)
+from socialai_dsl.engine.state import ArrayId
+arrays = [np.full((1, 64), 7, np.int64)] * len(ArrayId)
 identified = load(identify)
 identified(make_book(arrays), 1)
 print(arrays[0][0, 0], sum(identified.stats.cache_hits.values()), sum(identified.stats.cache_misses.values()))
