@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from operator import itemgetter
 from typing import Final, get_origin
 
 from socialai_dsl.diagnostics import Diagnostic
@@ -59,8 +61,7 @@ class Consequences:
             return True
         if code in _OF_TEXTS and any(path[0] in _SPEAKING for path in self._lost):
             return True
-        words = self._words_at(finding)
-        return words is None or not self._names.isdisjoint(words)
+        return not self._names.isdisjoint(self._words_at(finding))
 
     @cached_property
     def _names(self) -> set[str]:
@@ -88,18 +89,32 @@ class Consequences:
                 found.append((names[-1], _words(part.value)))
         return found
 
-    def _words_at(self, finding: Diagnostic) -> set[str] | None:
-        """The words of the value or key that a finding is about; None if nothing is written there."""
-        place = finding.span
-        found: set[str] | None = None
+    def _words_at(self, finding: Diagnostic) -> set[str]:
+        """The words of the value or key that a finding is about."""
+        parts = self._parts_of.get(finding.span.file, [])
+        if not parts:
+            return set()
+        _, _, _, part = parts[0]
+        index = part.source.index(finding.span)
+        number = bisect_right(parts, index, key=itemgetter(0)) - 1
+        start, end, key, part = parts[max(number, 0)]
+        if not start <= index <= end:
+            return set()
+        return {key, *(_words(part.value) if part.children is None else ())}
+
+    @cached_property
+    def _parts_of(self) -> dict[str, list[tuple[int, int, str, Node]]]:
+        """Of each file its keys and plain values in order: begin, end, the key if it is one, and what belongs to it."""
+        found: dict[str, list[tuple[int, int, str, Node]]] = {}
         for path, part in self._tree.walk():
-            if part.file != place.file or not path:
-                continue
-            key = part.span.key
-            if key is not None and key.line == place.line and 0 <= place.column - key.column <= key.width:
-                found = {str(path[-1]), *(_words(part.value) if part.children is None else ())}
-            elif part.children is None and part.span.start <= part.source.index(place) < max(part.end, 1):
-                found = _words(part.value)
+            of_file = found.setdefault(part.file, [])
+            if part.span.key is not None:
+                start = part.source.index(part.span.key)
+                of_file.append((start, start + part.span.key.width, str(path[-1]), part))
+            if part.children is None:
+                of_file.append((part.span.start, part.end, "", part))
+        for of_file in found.values():
+            of_file.sort(key=itemgetter(0))
         return found
 
 
