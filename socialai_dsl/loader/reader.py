@@ -296,7 +296,7 @@ def read_in_place(models: Sequence[type[BaseModel]], path: DataPath, plain: Plai
         return Plain(text)  # the key is what is reported
     held = next(filter(None, (held_at(model, path) for model in models)), None)
     held = held or texts_by_key().get(next((s for s in reversed(path) if isinstance(s, str)), ""))
-    if held is None or held.kind not in TEXTS or (held.kind == "prose" and text == "null"):
+    if held is None or held.kind not in TEXTS or (held.kind in ("prose", "label") and text == "null"):
         return plain
     return Plain(plain.value if type(plain.value) in held.beside else text)
 

@@ -579,6 +579,9 @@ class _Report:
         finding = findings[0]
         if self._parameters and isinstance(finding.value, str) and PARAMETER.fullmatch(finding.value):
             return
+        written = self._places.get(finding.path)
+        if finding.value == "" and written is not None and written.span.read is None:
+            return  # an item of a list without a value, which has been reported
         span = self._places.value_span(finding.path)
         for finding in findings:
             if finding.kind in ("greater_than_equal", "less_than_equal", "greater_than", "less_than"):

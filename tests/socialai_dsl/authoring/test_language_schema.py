@@ -1,7 +1,7 @@
 """The JSON Schema refuses what the models refuse, and is the one that is shipped."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -66,7 +66,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def agree(seeds: range, folder: Path) -> list[int]:
+def agree(seeds: Iterable[int], folder: Path) -> list[int]:
     """Compare the verdicts on a document for each seed; how many both accept, and how many both refuse."""
     counts = [0, 0]
     for seed in seeds:
@@ -80,7 +80,8 @@ def agree(seeds: range, folder: Path) -> list[int]:
 
 
 def test_the_schema_and_the_models_agree(folder: Path) -> None:
-    right, wrong = agree(range(300), folder)
+    label_that_is_nothing = 9727
+    right, wrong = agree([*range(300), label_that_is_nothing], folder)
     assert right > 60
     assert wrong > 60, "documents of both kinds are needed to tell anything"
 
