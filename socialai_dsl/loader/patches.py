@@ -138,6 +138,7 @@ _DESCRIPTION: Final = keys_that_hold(VariantFile, "prose")
 
 _MAPPINGS, _LISTS = map(frozenset, sections_of(Scenario))
 _OF_SUITES = tuple(map(frozenset, sections_of(Suite)))
+_OF_VARIANTS = sections_of(VariantFile)
 
 
 def _sections(root: Node) -> tuple[frozenset[str], frozenset[str]]:
@@ -368,7 +369,7 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
         found.error("S105", "a variant needs `of`: what it is a variant of", root.key_span(), hint=hint)
     elif not isinstance(base.value, str):
         found.error("S104", f"`of` names a file, it is not {base.kind}", base.value_span())
-    mappings, lists = sections_of(VariantFile)
+    mappings, lists = _OF_VARIANTS
     for key in {*VARIANT_KEYS} - {"of", *mappings, *lists}:
         entry = root.entry(key)
         if entry is not None and not isinstance(entry.value, str):

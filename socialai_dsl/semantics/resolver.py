@@ -53,7 +53,9 @@ from socialai_dsl.semantics.terms import (
     Type,
     arithmetic,
     draws,
+    holds_nothing,
     integer,
+    may_be_nothing,
     may_find_nothing,
     nothing_of,
     number,
@@ -440,10 +442,15 @@ class Registers:
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
         if path in self._given_ranges and _counts(type_):
             type_ = union(type_, self._given_ranges[path])
-        empties = declaration.starts_with_nothing or declaration.forgets
+        may_be_empty = any(may_be_nothing(start.term) for start, _ in starts)
+        empties = declaration.starts_with_nothing or declaration.forgets or may_be_empty
         nothing = nothing_of(type_) if empties else None
-        if declaration.starts_with_nothing and nothing is not None:
-            starts = [(replace(start, term=Const(type_, nothing)), called) for start, called in starts]
+        if nothing is not None and (declaration.starts_with_nothing or may_be_empty):
+            empty, only = Const(type_, nothing), declaration.starts_with_nothing
+            starts = [
+                (replace(start, term=empty if only else _or_empty(start.term, empty)), called)
+                for start, called in starts
+            ]
         drawn = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
         self._resolved[path] = _Resolved(Read(type_, path, nothing), drawn)
 
@@ -515,6 +522,14 @@ class Registers:
 def _counts(type_: Type) -> bool:
     """Whether values are numbers, or things, of which a register may need a wider range."""
     return type_.kind == "entity" or (type_.kind == "int" and not type_.words)
+
+
+def _or_empty(start: Term, empty: Const) -> Term:
+    """What a register starts with, and `empty` where that is another that holds nothing."""
+    if not may_be_nothing(start):
+        return start
+    room = replace(empty.type, low=min(empty.type.low, empty.value), words=())
+    return Select(room, (holds_nothing(start),), (empty,), start)
 
 
 def union(a: Type, b: Type) -> Type:
