@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import Final, get_origin
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.schema.annotations import annotation_at, keys_of, model_at
+from socialai_dsl.schema.annotations import annotation_at, keys_of, models_along
 from socialai_dsl.schema.holds import branches
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.source import DataPath, Node
@@ -19,10 +19,10 @@ _OF_WHOLE_FILES: Final = frozenset({"S316"})
 """What can only be said of a file without other errors: whatever has one may be what would make it possible."""
 
 _OF_NAMES: Final = frozenset({"S201", "S204", "S205", "S206", "S213", "S301", "S305"})
-"""What follows only where a name is spoken of that the part may have declared, or that depends on such a name."""
+"""What follows only where it is about a name that the part may have declared, or that depends on such a name."""
 
 _OF_TEXTS: Final = frozenset({"S401", "S402"})
-"""What follows as well where somebody may have said something in the part."""
+"""What also follows where the part decides what can be said."""
 
 _OF_PARTS: Final = frozenset({"S105", "S302", "S303", "S304", "S310", "S315"})
 """What may follow wherever the part is."""
@@ -126,8 +126,7 @@ def _is_whole(path: DataPath) -> bool:
 
 def _names_in(path: DataPath) -> Iterator[str]:
     """The steps of a path that are names of an author's, not keys that the language has there."""
-    for length, step in enumerate(path):
-        model = model_at(Scenario, path[:length])
+    for step, model in models_along(Scenario, path):
         if isinstance(step, str) and (model is None or step not in keys_of(model)):
             yield from _words(step)
 

@@ -32,7 +32,7 @@ def _spelt(value: Any) -> str:
     return _NOTHING if value is None else str(value)
 
 
-def test_rooms_apart(loaded: Loaded, program: Playable, episodes: int) -> dict[Value, NDArray[np.int64]]:
+def of_test_episodes(loaded: Loaded, program: Playable, episodes: int) -> dict[Value, NDArray[np.int64]]:
     """In which of test episodes 0 to `episodes - 1` each draw has each value: their numbers, by draw and value.
 
     Nothing where the scenario does not have its results told apart, and of acts in a row, which have a room each.

@@ -15,7 +15,7 @@ from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.factory import compiled, make, make_vec
 from socialai_dsl.envs.scenario_env import ScenarioEnv
-from socialai_dsl.envs.told_apart import test_rooms_apart
+from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy, require_trainer
@@ -97,7 +97,7 @@ class Evaluation:
         if self.trials > 1:
             figures["trials"] = [_some_of(*counts) for counts in result.by_trial(self.trials)]
         figures |= {**_by_member(self.program, shares), **self.more}
-        for (draw, value), numbers in test_rooms_apart(self.loaded, self.program, result.episodes).items():
+        for (draw, value), numbers in of_test_episodes(self.loaded, self.program, result.episodes).items():
             won = int(result.success[numbers].sum())
             figures.setdefault("results_by", {}).setdefault(draw, {})[value] = _some_of(won, len(numbers))
         if self.player.is_script:

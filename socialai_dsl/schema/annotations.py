@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
 from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
@@ -106,10 +107,24 @@ def _family(model: type | None) -> str:
 
 def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:
     """The model of the mapping at `path`; None if there is none."""
-    for part in branches(annotation_at(model, path)):
+    return _model_of(annotation_at(model, path))
+
+
+def _model_of(annotation: Any) -> type[BaseModel] | None:
+    for part in branches(annotation):
         if isinstance(part, type) and issubclass(part, BaseModel):
             return part
     return None
+
+
+def models_along(
+    model: type[BaseModel], path: DataPath
+) -> Iterator[tuple[str | int, type[BaseModel] | None]]:
+    """Each step of a path, with the model of the mapping that has it as a key; None if that mapping has no model."""
+    annotation: Any = model
+    for step in path:
+        yield step, _model_of(annotation)
+        annotation = _step(annotation, step)
 
 
 def annotation_at(model: type[BaseModel], path: DataPath) -> Any:
@@ -168,9 +183,8 @@ def held_at(model: type[BaseModel], path: DataPath) -> Holds | None:
     held: Holds | None = Holds("section")
     for step in path:
         below = _step(annotation, step)
-        if isinstance(
-            step, int
-        ):  # a list holds what its items do; where each of a group has one, the model has one
+        if isinstance(step, int):
+            # A list holds what its items do; where each of a group has one, the model has one.
             annotation = annotation if below is Any else below
         elif held is not None and held.kind == "patch":
             annotation = _patched(step)
@@ -207,11 +221,8 @@ def conditions_of(model: type[BaseModel]) -> dict[str, Means]:
 
 def has_unknown_key(model: type[BaseModel], path: DataPath) -> bool:
     """Whether a path goes through a key that the model there does not have."""
-    around = [model_at(model, path[:length]) for length in range(len(path))]
-    return any(
-        one is not None and isinstance(step, str) and step not in keys_of(one)
-        for one, step in zip(around, path, strict=True)
-    )
+    along = models_along(model, path)
+    return any(one is not None and isinstance(step, str) and step not in keys_of(one) for step, one in along)
 
 
 def may_hide(model: type[BaseModel], path: DataPath) -> bool:

@@ -420,9 +420,8 @@ class _Planner:
     ) -> SitedTerm:
         """What a key at a path asks for, and `when`."""
         resolver, key = self.resolver, str(path[-1])
-        resolver.written(
-            raw, INT, self._scope(path, f"{address}.{key}")
-        )  # what is wrong with it stands there
+        # What is wrong with the value is reported at its own place.
+        resolver.written(raw, INT, self._scope(path, f"{address}.{key}"))
         value = resolver.findings.expression(path, raw)
 
         def filled(node: ast.Expr) -> ast.Expr:

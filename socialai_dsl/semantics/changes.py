@@ -1,4 +1,4 @@
-"""What can happen to somebody or something in an episode: who moves, turns, leaves and appears; statuses of objects."""
+"""Who moves, turns, leaves and appears in an episode, and which statuses objects can have."""
 
 from __future__ import annotations
 

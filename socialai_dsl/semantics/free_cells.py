@@ -20,12 +20,12 @@ from socialai_dsl.semantics.facts import needs, relation
 from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Const, Term, compute, walk
+from socialai_dsl.semantics.words.relations import Cell
 from socialai_dsl.vocabulary import SIDES
 
 EXACT: Final = frozenset({"column", "row", "rect"})
 """Regions that name their cells: what may overlap can be put there where the room builds something, too."""
 
-Cell = tuple[int, int]
 Size = tuple[int, int]
 
 

@@ -392,8 +392,10 @@ def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope
         raise resolver.fail("S204", message, node, scope, hint=hint)
 
 
-def _needs_somebody(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> Exception:
-    """A verb without a subject: who is asked about beside it is meant, else the agent, or a thing."""
+def _needs_somebody(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> ReportedError:
+    """Report a verb without a subject; the cure puts one before it: what else the expression asks about, else the first
+    member or thing that there is.
+    """
     known = resolver.symbols.objects if signature.subject == "object" else resolver.symbols.numbers
     near = next((name for name in resolver.subjects_around() if name in known), next(iter(known), ""))
     message = f"`{signature.name}` needs somebody: `{near or 'door'}.{signature.name}`"

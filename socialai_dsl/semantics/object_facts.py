@@ -44,7 +44,6 @@ from socialai_dsl.semantics.terms import (
     number,
     numbers_of,
     walk,
-    where_it_is_found,
     where_there_is,
 )
 from socialai_dsl.source import DataPath, Span
@@ -271,7 +270,7 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
     keys = [found[lock] for lock in numbers]
     type_ = Type("entity", min(keys), max(keys))
     if len(set(keys)) == 1:
-        return where_it_is_found(who, Const(type_, keys[0]))
+        return where_there_is(who, Const(type_, keys[0]))
     shifts = {key - lock for lock, key in zip(numbers, keys, strict=True)}
     if len(shifts) == 1:
         # Objects that stand in the same order in two groups are found by adding to their number.

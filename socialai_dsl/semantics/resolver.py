@@ -442,13 +442,13 @@ class Registers:
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
         if path in self._given_ranges and _counts(type_):
             type_ = union(type_, self._given_ranges[path])
-        may_be_empty = any(may_be_nothing(start.term) for start, _ in starts)
-        empties = declaration.starts_with_nothing or declaration.forgets or may_be_empty
+        empties = declaration.starts_with_nothing or declaration.forgets
+        empties = empties or any(may_be_nothing(start.term) for start, _ in starts)
         nothing = nothing_of(type_) if empties else None
-        if nothing is not None and (declaration.starts_with_nothing or may_be_empty):
-            empty, only = Const(type_, nothing), declaration.starts_with_nothing
+        if nothing is not None:
+            empty, always = Const(type_, nothing), declaration.starts_with_nothing
             starts = [
-                (replace(start, term=empty if only else _or_empty(start.term, empty)), called)
+                (replace(start, term=empty if always else _or_empty(start.term, empty)), called)
                 for start, called in starts
             ]
         drawn = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
@@ -528,6 +528,7 @@ def _or_empty(start: Term, empty: Const) -> Term:
     """What a register starts with, and `empty` where that is another that holds nothing."""
     if not may_be_nothing(start):
         return start
+    # A value is cut to its type, so that has room for what stands for nothing.
     room = replace(empty.type, low=min(empty.type.low, empty.value), words=())
     return Select(room, (holds_nothing(start),), (empty,), start)
 

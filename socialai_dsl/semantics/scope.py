@@ -35,7 +35,6 @@ from socialai_dsl.semantics.terms import (
     integer,
     may_be_nothing,
     numbers_of,
-    where_it_is_found,
     where_there_is,
 )
 from socialai_dsl.source import Data, DataPath, Node, Span, TextEdit
@@ -653,7 +652,7 @@ def of_each(who: Term, values: Sequence[Term]) -> Term:
     """The value that belongs to whichever entity is meant; `values` in the order of those it can be."""
     numbers = numbers_of(who)
     if len(set(values)) == 1:
-        return where_it_is_found(who, values[0])
+        return where_there_is(who, values[0])
     if values[0].type.kind == "text":
         cases = zip(numbers, values, strict=True)
         return where_there_is(who, text_of([(equals(who, number), value) for number, value in cases]))

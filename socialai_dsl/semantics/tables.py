@@ -29,7 +29,6 @@ from socialai_dsl.semantics.terms import (
     all_of,
     chosen,
     numbers_of,
-    where_it_is_found,
     where_there_is,
 )
 from socialai_dsl.source import DataPath
@@ -67,8 +66,6 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
         if isinstance(key, Const):
             return values[keys.index(word)]
         cases[value] = values[keys.index(word)]
-    if len(cases) == 1:
-        return where_it_is_found(key, *cases.values())
     return where_there_is(key, chosen(key, [*cases], [*cases.values()], values[0].type))
 
 

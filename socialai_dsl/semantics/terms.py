@@ -556,13 +556,12 @@ def may_be_nothing(term: Term) -> bool:
 
 
 def where_there_is(needed: Term, result: Term) -> Term:
-    """A value that follows from another, which is asked for first: of an empty register nothing is found."""
-    return _asking_first(needed, result) if may_be_nothing(needed) else result
+    """A value that follows from another: of an empty register, or of what is not found, nothing follows.
 
-
-def where_it_is_found(needed: Term, result: Term) -> Term:
-    """The same of a value that does not depend on what the other is, only on whether there is one."""
-    return _asking_first(needed, result) if may_be_nothing(needed) or may_find_nothing(needed) else result
+    The other is asked for first where the value itself does not ask for it, or compares it alone.
+    """
+    unasked = may_find_nothing(needed) and needed not in walk(result)
+    return _asking_first(needed, result) if may_be_nothing(needed) or unasked else result
 
 
 def _asking_first(needed: Term, result: Term) -> Term:

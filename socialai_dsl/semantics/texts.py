@@ -13,7 +13,7 @@ from socialai_dsl import cures
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
-from socialai_dsl.semantics.cast import Case, grouped
+from socialai_dsl.semantics.cast import AGENT, Case, grouped
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
 from socialai_dsl.semantics.resolver import (
     INT,
@@ -268,7 +268,7 @@ def _report_unsayable(
 ) -> None:
     findings = resolver.findings
     said, word = unsayable[0]
-    if resolver.utterances.may_be_said(said, None if from_npcs else {"agent"}):
+    if resolver.utterances.may_be_said(said, None if from_npcs else {AGENT}):
         raise ReportedError
     if values and some:
         node, value = values[0]
@@ -393,7 +393,7 @@ def _agents(resolver: Resolver, line: Line) -> Line:
     unsayable = [said for said in texts if normal(said) not in spelled]
     if unsayable:
         said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
-        if resolver.utterances.may_be_said(said, {"agent"}):
+        if resolver.utterances.may_be_said(said, {AGENT}):
             raise ReportedError
         message = f'the agent cannot say "{said}" with this grammar'
         if len(unsayable) < len(texts) and any(_may_change(resolver, value) for value in values):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
+from socialai_dsl.semantics.terms import may_find_nothing
+
 
 def test_uses_that_disagree_are_a_mistake(mistakes):
     frames = {"look": {"states": {"a": {"do": "turn(glance)"}}}}
@@ -29,3 +33,21 @@ def test_both_mistakes_of_a_condition_are_found(mistakes):
 def test_both_sides_of_a_conditional_value_are_looked_at(mistakes):
     found = mistakes(outcome=[{"success": "agent.at(exitt if t > 2 else exi)"}])
     assert [text[:22] for text in found] == ["S201 unknown name `exi", "S201 unknown name `exi"]
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        '{}.kind == "door"',
+        "{}.unlocked_by == key",
+        "only({}.kind) == 1",
+        "{}.index == 0",
+        "{}.y == 0",
+        "{}.open",
+    ],
+)
+def test_of_what_is_not_found_nothing_follows_though_it_could_be_one_thing_alone(outcome_term, asked):
+    objects = {"key": {"type": "switch", "place": "anywhere", "unlocks": "doors"}}
+    sections = {"objects": objects, "tables": {"only": {"door": 1}}}
+    assert may_find_nothing(outcome_term(asked.format("first(d in doors where d.open)"), **sections))
+    assert not may_find_nothing(outcome_term(asked.format("exit"), **sections))
