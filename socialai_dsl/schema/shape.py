@@ -577,7 +577,7 @@ class _Report:
 
     def _wrong_value(self, findings: list[_Finding]) -> None:
         finding = findings[0]
-        if self._parameters and isinstance(finding.value, str) and PARAMETER.fullmatch(finding.value):
+        if self._stands_for_anything(finding.value):
             return
         written = self._places.get(finding.path)
         if finding.value == "" and written is not None and written.span.read is None:
@@ -588,8 +588,8 @@ class _Report:
                 hint = self._as_share(finding)
                 self._bag.error("S106", f"`{finding.value}` is {_bound(finding)}", span, hint=hint)
                 return
-            if finding.kind == "too_short" and any(p[:-1] == finding.path for p in self._repaired.lost):
-                return  # what is in it has been reported
+            if finding.kind == "too_short" and self._has_reported(finding.path):
+                return
             if finding.kind in ("too_short", "too_long", "string_too_short", "string_too_long"):
                 self._bag.error("S106", _length(finding), span)
                 return
@@ -612,6 +612,14 @@ class _Report:
         named = f"an entry of `{key}`" if finding.path and isinstance(finding.path[-1], int) else f"`{key}`"
         what = f"{named} is {expected}" if key else f"{expected} is expected"
         self._bag.error("S104", f"{what}, here is {got}", span, hint=hint)
+
+    def _stands_for_anything(self, value: object) -> bool:
+        return self._parameters and isinstance(value, str) and PARAMETER.fullmatch(value) is not None
+
+    def _has_reported(self, path: DataPath) -> bool:
+        """Whether what is wrong in a list has been told; a parameter is one item of it, whatever it stands for."""
+        parts = [self._places.get(lost) for lost in self._repaired.lost if lost[:-1] == path]
+        return any(part is None or not self._stands_for_anything(part.value) for part in parts)
 
     def _as_share(self, finding: _Finding) -> cures.Hint:
         """What a number in per cent is where a share is expected."""
