@@ -6,8 +6,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader.reader import read_document, shipped_folder
-from socialai_dsl.loader.resolved import TESTS
+from socialai_dsl.loader.resolved import TESTS, resolve
 from socialai_dsl.vocabulary import spelt
 
 IDS: Final = {
@@ -97,12 +98,14 @@ def recipes() -> dict[str, Recipe]:
 
 
 def variants_of(scenario: str) -> list[str]:
-    """What can follow a scenario's name after a `+`: variants of its own, then those that suit every scenario.
+    """What can follow a scenario's name after a `+`: variants of its own, those of its folder, those for every scenario.
 
-    A variant of what the scenario is itself a variant of counts too, where it has none of that name.
+    A variant of what the scenario is itself a variant of counts too, where it has none of that name. One of the folder
+    counts where all that it changes is there, as the School's cues need a caretaker who can give them.
     """
     documents = _documents()
     own: list[str] = []
+    taken: list[str] = []
     base = scenario
     while base in documents:
         own += [
@@ -110,11 +113,35 @@ def variants_of(scenario: str) -> list[str]:
             for name, content in documents.items()
             if name.startswith(f"{base}_") and not _stands_alone(content) and _base(name) == base
         ]
+        taken += [name.removeprefix(f"{base}_") for name in documents if name.startswith(f"{base}_")]
         base = _base(base)
-    shared = [
-        name for name, one in documents.items() if "/" not in name and _base(name) == "any" and "of" in one
+    folder = posixpath.dirname(scenario)
+    of_folder = [posixpath.basename(name) for name in _of_any(folder)] if folder else []
+    near = [name for name in of_folder if name not in taken and _suits(scenario, name)]
+    return list(dict.fromkeys([*own, *near, *_of_any("")]))
+
+
+def _of_any(folder: str) -> list[str]:
+    """The variants in a folder that are of any scenario, without those whose names say for which one they are."""
+    return [
+        name
+        for name in _documents()
+        if posixpath.dirname(name) == folder
+        and _base(name) == "any"
+        and not any(name.startswith(f"{other}_") for other in _documents())
     ]
-    return list(dict.fromkeys([*own, *shared]))
+
+
+@cache
+def _suits(scenario: str, variant: str) -> bool:
+    """Whether a variant for any scenario can be applied to this one; a suite's members would each have to be asked."""
+    if "suite" in _documents()[scenario]:
+        return False
+    try:
+        resolve(f"{scenario}+{variant}")
+    except ScenarioError:
+        return False
+    return True
 
 
 def is_shipped(name: str) -> bool:
@@ -178,5 +205,5 @@ def file_of(scenario: str, variant: str | None = None) -> Path:
         while base in _documents():
             names.append(f"{base}_{variant}")
             base = _base(base)
-        names.append(variant)
+        names += [posixpath.join(posixpath.dirname(scenario), variant), variant]
     return shipped_folder() / f"{next(name for name in names if name in _documents())}.yaml"

@@ -18,7 +18,9 @@ def test_each_says_what_it_is_about() -> None:
     assert not [one.name for one in entries if one.name.endswith("_oracle")]
 
 
-@pytest.mark.parametrize("name", ["talkitout_no_liar", "novel/sally_anne", "school/apple_stealing_asocial"])
+@pytest.mark.parametrize(
+    "name", ["talkitout_no_liar", "novel/sally_anne", "school/apple_stealing_asocial", "school/levers"]
+)
 def test_what_is_listed_can_be_loaded(name: str) -> None:
     (entry,) = (one for one in catalogue() if one.name == name)
     assert "oracle" in entry.variants
