@@ -98,7 +98,7 @@ def recipes() -> dict[str, Recipe]:
 
 
 def variants_of(scenario: str) -> list[str]:
-    """What can follow a scenario's name after a `+`: variants of its own, those of its folder, those for every scenario.
+    """What can follow a scenario's name after a `+`: variants of its own, of its folder, then those for every scenario.
 
     A variant of what the scenario is itself a variant of counts too, where it has none of that name. One of the folder
     counts where all that it changes is there, as the School's cues need a caretaker who can give them.

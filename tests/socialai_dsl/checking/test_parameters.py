@@ -102,10 +102,10 @@ def test_no_parameter_outlives_the_check(tmp_path: Path, value: str) -> None:
 def test_a_parameter_is_one_item_of_a_list_whatever_it_stands_for(tmp_path: Path) -> None:
     """A base in which a list is too short for any value is told so, not only the files that build on it."""
     file = tmp_path / "base.yaml"
-    text = "scenario: base\nabstract: true\nparams: {size: {values: [small, large]}}\nlooks: {s: {for: balls, words: WORDS}}"
-    file.write_text(text.replace("WORDS", "[$size]"), encoding="utf-8")
+    text = "scenario: base\nabstract: true\nparams: {n: {values: [a, b]}}\nlooks: {s: {for: balls, words: WORDS}}"
+    file.write_text(text.replace("WORDS", "[$n]"), encoding="utf-8")
     assert [(d.code, d.message) for d in check(file).diagnostics] == [
         ("S106", "`words` has fewer than 2 entries")
     ]
-    file.write_text(text.replace("WORDS", "[$size, middling]"), encoding="utf-8")
+    file.write_text(text.replace("WORDS", "[$n, middling]"), encoding="utf-8")
     assert check(file).diagnostics == ()

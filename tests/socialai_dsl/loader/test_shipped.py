@@ -33,6 +33,8 @@ def test_a_folder_has_variants_for_those_of_its_scenarios_that_they_suit() -> No
     assert "alone" not in variants_of("school/doors"), "`doors_alone` is a scenario of its own"
     assert CUES.isdisjoint(variants_of("school/apple_stealing")), "nobody is there to give a cue"
     assert CUES.isdisjoint(variants_of("school/information_seeking")), "its members have them"
-    assert not [name for name in variants_of("school/levers") if name.endswith("_oracle")], "scripts of others"
+    assert not [name for name in variants_of("school/levers") if name.endswith("_oracle")], (
+        "scripts of others"
+    )
     assert file_of("school/boxes", "pointing").name == "pointing.yaml"
     assert file_of("school/boxes", "unsocial").name == "unsocial.yaml"
