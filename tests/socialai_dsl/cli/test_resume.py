@@ -20,14 +20,14 @@ from trainer.checkpoint import read
 pytestmark = pytest.mark.thorough("kills and resumes whole processes")
 
 ROOT = Path(__file__).parents[3]
-HORIZONS = {"fast": 32, "paper-reference": 40}  # steps of each environment in an update
 TIMES = ("frames_per_second", "train_seconds")
 
-FAST = ["--net", "fast", "--threads", "2", "--envs", "8", "--checkpoint-every", "2"]
+FAST = ["--net", "fast", "--threads", "2", "--envs", "8", "--hyper", "horizon=32", "--checkpoint-every", "2"]
 SUITE = [str(ROOT / "tests/data/suites/school.yaml"), "--bonus", "lang", "--curriculum", "progress", *FAST]
 CELLS = ["help", "--bonus", "cell", "--recipe", "plain", *FAST]
 GUIDED = ["help", *FAST]
-BATCH_NORM = ["help", "--net", "paper-reference", "--threads", "1", "--envs", "2", "--checkpoint-every", "1"]
+PAPER = ["--net", "paper-reference", "--threads", "1", "--envs", "2", "--hyper", "horizon=40"]
+BATCH_NORM = ["help", *PAPER, "--checkpoint-every", "1"]
 Process = subprocess.Popen[str]
 LONG = [pytest.mark.slow, pytest.mark.timeout(7200)]
 
@@ -65,13 +65,23 @@ def lines(path: Path) -> list[str]:
     return path.read_text().splitlines() if path.exists() else []
 
 
-def kill_after(run: Path, process: Process, starts: int, updates: int, delay: float) -> None:
-    """Kill the process some moment after its log has that many updates."""
-    while process.poll() is None and (
-        len(lines(run / "starts.jsonl")) < starts or len(lines(run / "metrics.jsonl")) < updates
-    ):
+def frames_per_update(arguments: list[str]) -> int:
+    """Every run here says both numbers itself, since those of recipes and presets may change."""
+    envs, horizon = (arguments[arguments.index(option) + 1] for option in ("--envs", "--hyper"))
+    return int(envs) * int(horizon.removeprefix("horizon="))
+
+
+def kill_after(run: Path, process: Process, starts: int, updates: int, last: int, delay: float) -> None:
+    """Kill the process some moment after its log has that many updates, and before it goes far beyond the last."""
+
+    def has(updates: int) -> bool:
+        return len(lines(run / "metrics.jsonl")) >= updates
+
+    while process.poll() is None and not (len(lines(run / "starts.jsonl")) >= starts and has(updates)):
         time.sleep(0.002)
-    time.sleep(delay)
+    end = time.monotonic() + delay
+    while process.poll() is None and time.monotonic() < end and not has(last):
+        time.sleep(0.002)
     process.send_signal(signal.SIGKILL)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGKILL, f"the kill came too late: {output}"
@@ -84,7 +94,7 @@ def without_times(content: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("arguments", "updates", "kills"),
     [
-        pytest.param(SUITE, 6, 2, id="suite-2", marks=pytest.mark.timeout(900)),
+        pytest.param(SUITE, 7, 2, id="suite-2", marks=pytest.mark.timeout(900)),
         pytest.param(SUITE, 40, 20, id="suite-20", marks=LONG),
         pytest.param(CELLS, 40, 20, id="cells-20", marks=LONG),
         pytest.param(GUIDED, 40, 20, id="guided-20", marks=LONG),
@@ -94,17 +104,17 @@ def without_times(content: dict[str, Any]) -> dict[str, Any]:
 def test_a_killed_run_ends_as_one_that_never_stopped(
     arguments: list[str], updates: int, kills: int, started: Callable[..., Process], tmp_path: Path
 ) -> None:
-    envs = int(arguments[arguments.index("--envs") + 1])
-    frames = envs * HORIZONS[arguments[arguments.index("--net") + 1]] * updates
+    frames = updates * frames_per_update(arguments)
     command = [*arguments, "--frames", str(frames), "--eval-episodes", "20", "--seed", "3"]
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     finish(started(*command, "--out", str(whole)))
 
     rng = np.random.default_rng(0)
-    moments = sorted(rng.integers(0, updates - 1, kills).tolist())
+    last = updates - 2  # two updates and the evaluation are left whenever a kill comes
+    moments = sorted(rng.integers(0, last, kills).tolist())
     process = started(*command, "--out", str(killed))
     for number, moment in enumerate(moments):
-        kill_after(killed, process, number + 1, moment, float(rng.random()) * 0.3)
+        kill_after(killed, process, number + 1, moment, last, float(rng.random()) * 0.3)
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # a damaged newest file would only be a warning
             assert read(killed / "checkpoints").meta.update <= updates
