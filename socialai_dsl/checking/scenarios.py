@@ -406,10 +406,13 @@ def with_findings_on_rivals(
     """What was found in a scenario without errors, and what is wrong with its rivals, each checked where it plays.
 
     What a rival has a use for is not reported as idle. The agent's own frame, which nobody follows while a rival plays,
-    is judged without it, and a rival by itself.
+    is judged without it, and a rival by itself. Where one plays already, no frame is idle: it may be the agent's own.
     """
     bag, idle = DiagnosticBag(), {d for d in found if d.code in _OF_ALL_VARIANTS}
     own_frame = _frame_of_agent(scenario)
+    if own_frame in scenario.rivals:
+        frames = {resolved.tree.key_span(("frames", name)) for name in scenario.frames}
+        idle = {d for d in idle if d.span not in frames}
     judged = {d for d in idle if own_frame and _is_in(resolved.tree.get(("frames", own_frame)), d.span)}
     for name, rival in scenario.rivals.items():
         own = DiagnosticBag()

@@ -55,9 +55,7 @@ class VariantFile(Model):
     """A patch: what is removed from a scenario or suite, then set, then added."""
 
     variant: Annotated[str, Holds("new name")] = Field(description="the name of the variant")
-    of: FileName = Field(
-        description="the file it is a variant of, or `any`", examples=["talkitout.yaml", "any"]
-    )
+    of: FileName = Field(description="the file it is a variant of, or `any`", examples=["shop.yaml", "any"])
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
     skills: list[Prose] = Field(default_factory=list, description="the skills that it needs, for people")

@@ -177,6 +177,20 @@ class When(IntEnum):
     ANY_TIME = 2
 
 
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """What keeps conditions from holding together.
+
+    Attributes:
+        term: a number that would have to be at least `low` and at most `high`, which is less; None: one of the
+            conditions is the opposite of another.
+    """
+
+    term: Term | None
+    low: int = 0
+    high: int = 0
+
+
 class SaidLater(terms.SaidBy):
     """What a member says in this step that has its turn later, so that it is never said yet."""
 
@@ -295,7 +309,9 @@ class TermFacts:
 
     def _joined(self, every: bool, conditions: Sequence[Term]) -> Sequence[int]:
         false, true = ([self.may_be(one, wanted) for one in conditions] for wanted in (False, True))
-        return _truths(any(false), all(true)) if every else _truths(all(false), any(true))
+        if not every:
+            return _truths(all(false), any(true))
+        return _truths(any(false), all(true) and contradiction(conditions) is None)
 
     def _compared(self, term: terms.Compare) -> Sequence[int]:
         if any(terms.is_own_noun(side) or terms.may_be_nothing(side) for side in (term.left, term.right)):
@@ -312,6 +328,54 @@ class TermFacts:
                 return _truths(b[0] <= a[-1], a[0] < b[-1])
             case "<=":
                 return _truths(b[0] < a[-1], a[0] <= b[-1])
+
+
+def contradiction(conditions: Iterable[Term]) -> Contradiction | None:
+    """What of conditions that would have to hold together cannot: a number below and above something, or a condition
+    and its opposite.
+    """
+    together = [one for one in _each(conditions) if not terms.draws(one)]
+    bounds: dict[Term, tuple[int, int]] = {}
+    for term, low, high in filter(None, map(_bounds, together)):
+        known = bounds.get(term, (low, high))
+        bounds[term] = low, high = max(low, known[0]), min(high, known[1])
+        if low > high:
+            return Contradiction(term, low, high)
+    return None if set(together).isdisjoint(map(_opposite, together)) else Contradiction(None)
+
+
+def _each(conditions: Iterable[Term]) -> Iterator[Term]:
+    for one in conditions:
+        if isinstance(one, terms.Logic) and one.op == "and":
+            yield from _each(one.args)
+        else:
+            yield one
+
+
+def _opposite(condition: Term) -> Term:
+    match condition:
+        case terms.Not(arg=arg):
+            return arg
+        case terms.Compare(op="<" | "<=" as op, left=left, right=right):
+            return terms.Compare("<=" if op == "<" else "<", right, left)
+        case terms.Compare(op="==" | "!=" as op, left=left, right=right):
+            return terms.Compare("!=" if op == "==" else "==", left, right)
+    return terms.Not(condition)
+
+
+def _bounds(condition: Term) -> tuple[Term, int, int] | None:
+    """A number that is compared with a known one, and the least and the greatest it is where the condition holds."""
+    match condition:
+        case terms.Compare(op="<" | "<=" | "==" as op, left=term, right=Const(value=bound)):
+            low = bound if op == "==" else min(term.type.low, bound)
+            high = bound - (op == "<")
+        case terms.Compare(op="<" | "<=" | "==" as op, left=Const(value=bound), right=term):
+            low = bound + (op == "<")
+            high = bound if op == "==" else max(term.type.high, bound)
+        case _:
+            return None
+    nothing = terms.is_own_noun(term) or terms.may_be_nothing(term)
+    return None if isinstance(term, Const) or term.type.kind != "int" or nothing else (term, low, high)
 
 
 def _truths(false: bool, true: bool) -> Sequence[int]:

@@ -16,7 +16,7 @@ from socialai_dsl.grammar.ast import Not, every, unparse
 from socialai_dsl.schema.annotations import keys_of
 from socialai_dsl.schema.scenario import Frame, Scenario, State, Step, UtteranceGrammar
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.facts import SaidLater, TermFacts
+from socialai_dsl.semantics.facts import Contradiction, SaidLater, TermFacts, contradiction
 from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of, surviving
 from socialai_dsl.semantics.terms import (
@@ -496,9 +496,21 @@ def _by_place(found: Iterable[tuple[Span, SitedTerm]]) -> Iterator[tuple[Span, l
 def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     for frame in checked.frames:
         for rule in frame.rules:
-            if rule.when is not None:
-                yield rule.when.span, _in_turn(frame, rule.when)
+            when = _with_after(frame, rule, checked.horizon)
+            if when is not None:
+                yield when.span, _in_turn(frame, when)
     yield from ((rule.when.span, rule.when) for rule in checked.rules if rule.when is not None)
+
+
+def _with_after(frame: FramePlan, rule: RulePlan, horizon: int) -> SitedTerm | None:
+    """The condition of a rule, with that of its `after`, which a plan keeps apart where it is a known number."""
+    if not rule.after:
+        return rule.when
+    clock = terms.Read(terms.Type("int", 0, horizon), f"{frame.member}.clock")
+    reached = terms.Compare("<=", terms.number(rule.after), clock)
+    if rule.when is None:
+        return SitedTerm(reached, f"{rule.site}.when", rule.span)
+    return replace(rule.when, term=Logic("and", (reached, rule.when.term)))
 
 
 def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
@@ -569,6 +581,8 @@ class Possible:
         """What of a condition is never so, as a hint; None where nothing in it depends on what happens."""
         match term:
             case terms.Logic(op="and", args=args):
+                if all(map(self._facts.may_be, args)) and (found := contradiction(args)) is not None:
+                    return _why_not_together(found)
                 return next(
                     (why for arg in args if not self._facts.may_be(arg) and (why := self._why(arg))), None
                 )
@@ -602,6 +616,12 @@ class Possible:
         return " or ".join(f"`{key}`" for key in keys)
 
 
+def _why_not_together(found: Contradiction) -> str:
+    if found.term is None:
+        return "it asks for something and for its opposite"
+    return f"{_called(found.term)} would have to be at least {found.low} and at most {found.high}"
+
+
 def _bounds(left: Term, right: Term) -> str:
     """The ranges of what is compared."""
     return (
@@ -617,7 +637,8 @@ def _called(term: Term) -> str:
         case terms.World(name=name) | terms.FieldOf(name=name) | terms.Measure(name=name):
             return f"`{name}`"
         case terms.Read(path=path):
-            return f"`{path.rpartition('.')[2]}`"
+            register = path.rpartition(".")[2]
+            return f"`{'turns_in_state' if register == 'clock' else register}`"
     return "what is compared"
 
 

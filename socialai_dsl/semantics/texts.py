@@ -74,7 +74,7 @@ def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     """Whether the agent said one of the texts at `node` in this step."""
     return any_of(
         all_of([Said(pattern), *_given(drawn), *_given(given)])
-        for text, drawn, span in texts(resolver, node, scope)
+        for text, drawn, span in texts(resolver, node, scope, resolver.utterances.all_texts())
         for pattern, given in patterns(resolver, text, scope, span, False)
     )
 
@@ -84,15 +84,21 @@ def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     if isinstance(node, ast.Name) and node.id == ANYTHING:
         found = heard_at(resolver, ANYTHING, scope)
         return any_of(all_of([Heard((pattern,)), *_given(given)]) for pattern, given in found)
+    can_be_heard = chain(resolver.utterances.npc_texts, resolver.utterances.all_texts())
     return any_of(
         all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
-        for text, drawn, span in texts(resolver, node, scope)
+        for text, drawn, span in texts(resolver, node, scope, can_be_heard)
         for pattern, given in for_ears(resolver, patterns(resolver, text, scope, span, True), scope)
     )
 
 
-def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None, Span]]:
-    """The texts that an argument names, each with the condition that it is meant and where it is written."""
+def texts(
+    resolver: Resolver, node: ast.Expr, scope: Scope, sayable: Iterable[str]
+) -> list[tuple[ast.Text, Term | None, Span]]:
+    """The texts that an argument names, each with the condition that it is meant and where it is written.
+
+    `sayable` is what can be said there, of which one may be meant by what is no text.
+    """
     found: list[tuple[ast.Text, Term | None, Span]] = []
     for option in ast.options_of(node):
         slot = text_slot(resolver, option, scope)
@@ -102,17 +108,27 @@ def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Te
         elif isinstance(option, ast.Text):
             found.append((option, None, resolver.findings.node(scope.path, option)))
         else:
-            message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
-            slots = scope.frame.texts if scope.frame is not None else ()
-            near = did_you_mean(option.id, slots) if isinstance(option, ast.Name) else None
-            anything = isinstance(option, ast.Name) and option.id == ANYTHING
-            hint = (
-                "whether something was said is `agent.spoke`; what was heard, `heard(any)`"
-                if anything
-                else None
-            )
-            raise resolver.fail("S211", message, option, scope, suggestion=near, hint=hint)
+            raise _no_text(resolver, option, scope, sayable)
     return found
+
+
+def _no_text(resolver: Resolver, option: ast.Expr, scope: Scope, sayable: Iterable[str]) -> ReportedError:
+    message = f"`{quoted(option)}` is not a text; what is said is quoted"
+    name = option.id if isinstance(option, ast.Name) else ""
+    if name == ANYTHING:
+        hint = "whether something was said is `agent.spoke`; what was heard, `heard(any)`"
+        return resolver.fail("S211", message, option, scope, hint=hint)
+    near = did_you_mean(name, scope.frame.texts if scope.frame is not None else ())
+    if near is not None:
+        return resolver.fail("S211", message, option, scope, suggestion=near)
+    known = {normal(text): text for text in sayable}
+    begun = (text for said, text in known.items() if name and said.startswith(f"{normal(name)} "))
+    meant = known.get(normal(name)) or did_you_mean(name, known.values()) or next(begun, None)
+    if meant is not None:
+        cure = resolver.instead(f'"{meant}"', option, scope)
+        return resolver.fail("S211", message, option, scope, hint=cure)
+    example = next((f'such as "{text}"' for text in known.values()), None)
+    return resolver.fail("S211", message, option, scope, hint=example)
 
 
 def text_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[Filling] | None:
@@ -578,7 +594,7 @@ def said_by(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     if [*members] == ["agent"]:
         return said(resolver, argument, scope)
     found: list[Term] = []
-    for text, chosen, span in texts(resolver, argument, scope):
+    for text, chosen, span in texts(resolver, argument, scope, _sayable(resolver, members)):
         if text.plain is not None:
             _check_said(resolver, text, members, span)
         for pattern, given in patterns(resolver, text, scope, span, True):

@@ -116,6 +116,16 @@ def test_what_only_a_rival_uses_is_not_idle(tmp_path: Path) -> None:
     assert [d.code for d in check(written(tmp_path, HIDDEN)).diagnostics] == ["W317"]
 
 
+def test_the_frame_that_the_agent_has_where_no_rival_plays_is_not_idle(tmp_path: Path) -> None:
+    text = HIDDEN.replace("place: row(5)", "place: row(5), frame: guess").replace(
+        "cast:",
+        "  guess: {steps: [{say: It is <first_box.color>}]}\n  idle: {steps: [{say: It is red}]}\ncast:",
+    )
+    path = written(tmp_path, text + RIVALS)
+    assert [d.message for d in check(path).diagnostics] == ["nobody follows the frame `idle`"]
+    assert check(f"{path}+always_red").diagnostics == ()
+
+
 @pytest.mark.parametrize("name", ["talkitout", "help", "novel/gossip", "novel/sally_anne"])
 def test_shipped_rivals_begin_in_the_same_rooms_as_the_scenario(name: str) -> None:
     loaded = load(name)

@@ -90,3 +90,36 @@ def test_what_a_rule_heard_is_found(examine, hears, say, dead):
         rules = [{"when": "agent.spoke", "say": say}, {"when": "agent.spoke", "say": "Sesame"}]
     found = examine(frames={"talk": {"states": {"a": {"then": rules}}}}, cast={"guide": {"frame": "talk"}})
     assert [d.code for d in found.diagnostics if d.code == "W311"] == ["W311"] * dead
+
+
+@pytest.mark.parametrize(
+    ("rule", "why"),
+    [
+        ({"before": 3, "after": 3}, "`turns_in_state` would have to be at least 3 and at most 2"),
+        ({"before": 4, "after": 3}, None),
+        ({"before": 0}, "`turns_in_state` is from 0 to 20"),
+        ({"after": 21}, "`turns_in_state` is from 0 to 20"),
+        ({"after": 20}, None),
+        ({"before": "told", "after": "told"}, "it asks for something and for its opposite"),
+        ({"before": "told + 1", "after": "told"}, None),
+        ({"when": "t > 4 and (told == 2 and t < 5)"}, "`t` would have to be at least 5 and at most 4"),
+        ({"when": "told == 2 and told == 3"}, "`told` would have to be at least 3 and at most 2"),
+        ({"when": "told == 2 or told == 3"}, None),
+        ({"when": "agent.next_to(self) and not agent.next_to(self)"}, "it asks for something and for its opposite"),
+        ({"when": "last == exit and last != exit"}, "it asks for something and for its opposite"),
+        ({"when": "pick(doors).x == 0 and pick(doors).x > 3"}, None),
+        ({"when": "after(3) and told < $least", "after": 3}, None),
+    ],
+)  # fmt: skip
+def test_conditions_that_cannot_hold_together(examine, rule, why):
+    registers = {"told": {"start": 0, "range": "0..9"}, "last": {"start": "none"}}
+    known = {"when": "t == 19", "set": {"last": "exit", "told": 4}}
+    frame = {"let": registers, "states": {"a": {"first": [known, {**rule, "say": "Yes"}]}}}
+    doors = {"doors": {"type": "door", "count": 4, "place": "each_wall(2)", "color": "random"}}
+    cast = {"guide": {"frame": "talk"}}
+    found = examine(
+        params={"least": 3}, define={"after(k)": "guide.turns_in_state >= k"}, horizon=20,
+        objects=doors, frames={"talk": frame}, cast=cast,
+    )  # fmt: skip
+    assert not found.has_errors, [str(d) for d in found.diagnostics]
+    assert [d.hint for d in found.diagnostics if d.code == "W311"] == [why] * (why is not None)
