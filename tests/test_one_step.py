@@ -280,6 +280,24 @@ def test_1_15_a_status_that_holds_for_a_moment_has_followed(play: Folder) -> Non
     )
 
 
+@pytest.mark.parametrize(
+    ("more", "to"),
+    [
+        ("", [3, 1]),
+        ("objects: {box: {type: box, at: [3, 1]}}", [2, 1]),
+        ("objects: {mat: {type: floor, at: [3, 1]}}", [3, 1]),
+        ("room: {size: 7, build: [{lava: 'rect(3, 1, 3, 1)'}]}", [2, 1]),
+        ("cast: {bob: {at: [3, 1]}}", [2, 1]),
+    ],
+)
+def test_1_16_who_can_be_pushed_is_moved_and_the_agent_stays(play: Folder, more: str, to: list[int]) -> None:
+    ann = "ann: {at: [2, 1], facing: down, pushed_by: anybody}"
+    text = more.replace("cast: {", f"cast: {{{ann}, ") if "cast" in more else f"cast: {{{ann}}}\n{more}"
+    run = play(text).step("forward")
+    assert (run.at("agent"), run.at("ann"), run.facing("ann")) == ([1, 1], to, "down")
+    assert play("cast: {ann: {at: [2, 1]}}").step("forward").at("ann") == [2, 1], "nobody can without the key"
+
+
 # -- 2. what counts and rolls by itself ------------------------------------------------------------
 
 
@@ -1827,6 +1845,21 @@ def test_5_75_what_is_said_to_a_member_that_is_not_found_is_not_said(play: Folde
         cast: {ann: {at: [5, 5], frame: tell}}
     """)
     assert run.step().info["utterance"] == "Ann: Nobody"
+
+
+def test_5_76_an_npc_pushes_who_can_be_pushed(play: Folder) -> None:
+    run = play("""
+        frames: {walk: {steps: [{do: forward, for: 2}]}}
+        cast:
+          agent: {at: [3, 3], pushed_by: anybody}
+          ann: {at: [2, 5], facing: right, frame: walk}
+          bob: {at: [3, 5], facing: left, pushed_by: anybody}
+          cleo: {at: [3, 4], facing: up, frame: walk}
+    """).step()
+    assert (run.at("ann"), run.at("bob"), run.facing("bob")) == ([2, 5], [4, 5], "left")
+    assert (run.at("cleo"), run.at("agent")) == ([3, 4], [3, 2])
+    run.step()
+    assert (run.at("ann"), run.at("bob")) == ([3, 5], [4, 5])
 
 
 # -- 6. memories -----------------------------------------------------------------------------------

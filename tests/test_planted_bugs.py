@@ -32,6 +32,7 @@ from tests.reference.interpreter import Action, Reference, Result
 SAMPLES = Path(__file__).parent / "data" / "agreement"
 COUNTING = str(SAMPLES / "counting.yaml")
 WALKERS = str(SAMPLES / "walkers.yaml")
+CROWD = str(SAMPLES / "crowd.yaml")
 PERILS = str(SAMPLES / "perils.yaml")
 SHIPPED_SAMPLES = ("talkitout+oracle", "showme+oracle", "school/boxes+pointing", "novel/interpreter")
 EPISODES = 60
@@ -128,6 +129,12 @@ PLANTED: dict[str, tuple[str, Change]] = {
     "hidden NPCs who are always audible are silent": (
         "talkitout_no_liar+as_coded+unsocial",
         lambda checked: replace(checked, entities=tuple(replace(e, audible=False) for e in checked.entities)),
+    ),
+    "nobody goes out of the way": (
+        CROWD,
+        lambda checked: replace(
+            checked, entities=tuple(replace(e, pushed_by_bodies=False) for e in checked.entities)
+        ),
     ),
     "the agent does not hear itself": (PERILS, lambda checked: replace(checked, own_voice=False)),
 }

@@ -148,7 +148,17 @@ SPOKEN_OF = (
         "overheard: false",
         " to: ",
     ),
-    *("timer:", "exclusive: true", "unlocks:", "opens:", "inside:", "pushed_by:", "locked:", "tagged:"),
+    *(
+        "timer:",
+        "exclusive: true",
+        "unlocks:",
+        "opens:",
+        "inside:",
+        "pushed_by: marble",
+        "locked:",
+        "tagged:",
+    ),
+    *("pushed_by: anybody", "push(ann", "push(agent"),
     *(
         "carryable: true",
         "pickup",

@@ -290,7 +290,7 @@ def _entity_row(entity: Entity, types: _TypeTable, accepts: Mapping[int, int]) -
         EntityColumn.KIND: entity.kind_code,
         EntityColumn.NEAR: entity.near,
         EntityColumn.FAR: entity.far,
-        EntityColumn.AUDIBLE: int(entity.audible),
+        EntityColumn.MANNERS: entity.audible | entity.pushed_by_bodies << 1,
         EntityColumn.VIEW: entity.view,
         EntityColumn.PUSHED_BY: entity.pushed_by_rolling | entity.carryable << 1,
     }
@@ -608,10 +608,17 @@ def _entities(program: Program) -> None:
         first = row[EntityColumn.TYPE]
         statuses = max(1, len(entity.states))
         _require(first >= 0 and first + statuses <= len(types), f"the type of {entity} is out of range")
-        kind, view, pushed_by = (
-            row[column] for column in (EntityColumn.KIND, EntityColumn.VIEW, EntityColumn.PUSHED_BY)
+        kind, manners, view, pushed_by = (
+            row[column]
+            for column in (
+                EntityColumn.KIND,
+                EntityColumn.MANNERS,
+                EntityColumn.VIEW,
+                EntityColumn.PUSHED_BY,
+            )
         )
         _require(0 <= kind < 256, f"the status code of {entity} does not fit into the picture")
+        _require(manners in range(4), f"{entity} has the manners {manners}")
         _require(0 < view <= 2 * MAX_SIDE, f"{entity} sees {view} cells far")
         if entity.role == "object":
             _require(pushed_by in range(4), f"{entity} is pushed by {pushed_by}")

@@ -310,7 +310,8 @@ def _traits(program: Program) -> int:
     types, starts = program.table(Header.TYPE_AT), _types(program)
     # What has one status only cannot change it.
     status = np.arange(len(types)) - starts[np.searchsorted(starts, np.arange(len(types)), "right") - 1]
-    if (types[:, TypeColumn.PUSHED] != status).any():
+    pushed_members = program.table(Header.ENTITY_AT)[:, EntityColumn.MANNERS] & 2
+    if (types[:, TypeColumn.PUSHED] != status).any() or pushed_members.any():
         traits |= Trait.PUSHED
     if program.table(Header.FRAME_AT)[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]].any():
         traits |= Trait.APART

@@ -1,4 +1,4 @@
-"""Moving objects: put on a cell, pushed by a body, rolling until something blocks them."""
+"""What moves others: put on a cell, pushed by a body, rolling until something blocks them."""
 
 from socialai_dsl.engine.boards import draw_cell, is_deadly, is_in_the_way, is_solid, type_row
 from socialai_dsl.engine.entities import (
@@ -77,6 +77,22 @@ def push(row: Row, x: int, y: int, direction: int, rolling: int) -> None:
     if status != field(row, entity, Field.STATUS) and rolling >= only_rolling:
         set_field(row, entity, Field.DIR, direction)
         _become(row, entity, status)
+
+
+@outline
+def push_aside(row: Row, x: int, y: int, direction: int) -> None:
+    """A body walks into a cell that is not solid: who can be pushed there goes on to the next one, if that is free."""
+    stay_outline()
+    who = npc_at(row, x, y)  # or the agent, which is 0
+    ahead_x = x + step_x(direction)
+    ahead_y = y + step_y(direction)
+    if not is_at(row, who, x, y) or column(row, who, EntityColumn.MANNERS) & 2 == 0:
+        return
+    if is_free(row, ahead_x, ahead_y):
+        set_field(row, who, Field.X, ahead_x)
+        set_field(row, who, Field.Y, ahead_y)
+        draw_cell(row, x, y)
+        draw_cell(row, ahead_x, ahead_y)
 
 
 @outline

@@ -171,7 +171,7 @@ def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
 @inline
 def _agent_may_hear(row: Row, speaker: int) -> bool:
     """Whether the agent hears an NPC at all: not while NPCs are hidden, unless the NPC is always audible."""
-    return not npcs_are_hidden(row) or column(row, speaker, EntityColumn.AUDIBLE) == 1
+    return not npcs_are_hidden(row) or column(row, speaker, EntityColumn.MANNERS) & 1 != 0
 
 
 @inline

@@ -85,7 +85,9 @@ class Trait(IntEnum):
     """Bits that a batch adds to Header.FLAGS of its programs: what does not happen need not be asked for one by one."""
 
     GOES_BY_ITSELF = 1 << 20  # something counts or rolls
-    PUSHED = 1 << 21  # some object takes another status when it is pushed
+    PUSHED = (
+        1 << 21
+    )  # some object takes another status when it is pushed, or a member of the cast goes out of the way
     GESTURES = 1 << 22  # pictures of the batch have channels for where NPCs point and what they did last
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
     MORE = 1 << 25  # pictures of the batch have channels of CELLS, of HANDS, or of looks

@@ -14,7 +14,7 @@ from socialai_dsl.engine.entities import (
 from socialai_dsl.engine.jit import inline, merged, outline, stay_outline
 from socialai_dsl.engine.operands import draw_action, value
 from socialai_dsl.engine.paths import face
-from socialai_dsl.engine.pushing import is_free, push, roll
+from socialai_dsl.engine.pushing import is_free, push, push_aside, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
 from socialai_dsl.engine.vm import answer, past_tests, run
@@ -118,6 +118,8 @@ def move_agent(row: Row, action: int) -> None:
         elif npcs_are_hidden(row) or npc_at(row, x, y) == 0:
             set_field(row, AGENT, Field.X, x)
             set_field(row, AGENT, Field.Y, y)
+        elif row.program[Header.FLAGS] & Trait.PUSHED:
+            push_aside(row, x, y, direction)
     elif action <= Body.RIGHT:
         set_field(row, AGENT, Field.DIR, (direction + 2 * action - 1) & 3)
     elif action == Body.TOGGLE:
@@ -148,6 +150,8 @@ def move_npc(row: Row, npc: int, action: int) -> None:
             set_field(row, npc, Field.Y, ahead_y)
             draw_cell(row, x, y)
             draw_npc(row, npc)
+        elif row.program[Header.FLAGS] & Trait.PUSHED:
+            push_aside(row, ahead_x, ahead_y, direction)
     elif action == Body.TOGGLE:
         set_field(row, npc, Field.TOGGLED, _toggle_object(row, ahead_x, ahead_y))
     elif action == Body.STOP_POINTING:

@@ -79,7 +79,7 @@ def _reaches(program: Program) -> Iterator[_Reach]:
     """Of the voices that the agent can hear."""
     hidden = has(program, Flag.NPCS_HIDDEN)
     for number, entity in enumerate(program.entities):
-        audible = program.table(Header.ENTITY_AT)[number, EntityColumn.AUDIBLE]
+        audible = program.table(Header.ENTITY_AT)[number, EntityColumn.MANNERS] & 1
         if entity.role == "npc" and (audible or not hidden):
             yield _reach(program, number)
 

@@ -203,7 +203,7 @@ class EntityColumn(IntEnum):
     KIND = 1  # NPC: greatest status code it can have in the picture (see Field.STATUS); object: 0
     NEAR = 2  # least and greatest Manhattan distance at which its voice is heard
     FAR = 3
-    AUDIBLE = 4  # 1: heard even while NPCs are hidden
+    MANNERS = 4  # member of the cast, bits: 1 heard even while NPCs are hidden, 2 moved by who walks into it
     VIEW = 5  # side of its view square
     PUSHED_BY = 6  # who can push an object: 0 anybody, 1 only what rolls; 2 is added if it can be carried
     ACCEPTS = 6  # member of the cast: 0 takes what it is given; else a register that is 1 while it does

@@ -415,6 +415,9 @@ class Character(Model):
         None, description="whether it takes what is given to it; default always", examples=["is(waiting)"]
     )
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
+    pushed_by: Literal["anybody"] | None = Field(
+        None, description="who walks into it moves it one cell the same way, and stays; default nobody can"
+    )
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 
 

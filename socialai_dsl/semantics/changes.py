@@ -37,6 +37,8 @@ class Mobility:
                 self.walking.add(entity.number)
             if entity.type is not None and entity.type.pushed:
                 self.turning.add(entity.number)
+            if entity.pushed_by_bodies:
+                self.walking.add(entity.number)
             if entity.carryable:
                 self.carried.add(entity.number)
             if entity.contains:

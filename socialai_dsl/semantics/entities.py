@@ -529,6 +529,7 @@ def entities_of(resolver: Resolver) -> Iterator[Entity]:
                 near=near,
                 far=far,
                 audible=member.value("audible") == "always",
+                pushed_by_bodies=member.value("pushed_by") is not None,
                 tone=rows.tone_of(resolver, number) if symbols.scenario.observe.tone and number else None,
                 view=member.value("view") or VIEW,
             )

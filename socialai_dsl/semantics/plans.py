@@ -339,6 +339,8 @@ class Entity:
     near: int = 1
     far: int = 1
     audible: bool = False
+    pushed_by_bodies: bool = False
+    """Whether a member of the cast goes out of the way of who walks into it."""
     view: int = 7
     kind_drawn: Term | None = None
     initial: Read | None = None

@@ -42,6 +42,7 @@ def act(world: World, body: Entity, primitive: str) -> None:
     elif primitive == "forward":
         body.bumped = True
         motion.push(world, ahead, body.facing)
+        motion.push_aside(world, body, ahead)
     elif word == "point":
         body.pointing = way if way.isalpha() else tuple(map(int, way.split()))  # type: ignore[assignment]
     elif word == "stop_pointing":

@@ -16,6 +16,14 @@ def push(world: World, cell: Cell, direction: str, rolled: bool = False) -> None
         thing.status, thing.facing = changes[thing.status], direction
 
 
+def push_aside(world: World, body: Entity, cell: Cell) -> None:
+    """Somebody walks into a member of the cast: if it can be pushed and the next cell is clear, it goes there."""
+    there = [member for member in (*world.npcs, world.agent) if member.cell == cell and member is not body]
+    beyond = step_from(cell, body.facing)
+    if there and there[0].pushed_aside and world.walkable(cell) and clear(world, beyond):
+        there[0].cell = beyond
+
+
 def count_down(world: World) -> None:
     """Timers: an active status expires after its steps; in any other, and then, the count starts anew."""
     for thing in world.things():

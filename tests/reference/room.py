@@ -149,6 +149,7 @@ class Setup:
         for name, member in self.members.items():
             person = Entity(name, "agent" if name == "agent" else "npc", kind=member.kind or "peer")
             person.view = member.view or 7
+            person.pushed_aside = member.pushed_by == "anybody"
             person.frame = member.frame
             person.state = self.start_of(member.frame)
             if name != "agent":

@@ -169,6 +169,7 @@ class Member:
     with_: dict[str, Any] = field(default_factory=dict)
     beliefs: dict[str, Belief] = field(default_factory=dict)
     audible: str | None = None
+    pushed_by: str | None = None
     accepts: Any = None
     kind_code: int | None = None
 

@@ -184,6 +184,7 @@ class Entity:
     poked: bool = False
     was_poked: bool = False
     accepts: bool = True  # in this step
+    pushed_aside: bool = False  # whoever walks into it moves it
 
     @property
     def gone(self) -> bool:

@@ -469,6 +469,8 @@ class _Author:
             frames.append(self.new_frame("frame_9", False))
             frames[-1].of_agent = True
             self.declared.follows["agent"] = frames[-1]
+        everybody = (*self.declared.members, *self.declared.groups, "agent")
+        self.declared.pushed = [name for name in everybody if self.often(0.2)]
         return frames
 
     def new_frame(self, name: str, of_group: bool) -> Frame:
@@ -553,6 +555,8 @@ class _Author:
                 made["agent"]["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
         if self.often(0.3):
             made["agent"]["facing"] = self.rng.choice(("up", "random", "left"))
+        for name in self.declared.pushed:
+            made[name]["pushed_by"] = "anybody"
         return made
 
     def refuse(self, member: dict[str, Any]) -> None:

@@ -258,6 +258,9 @@ class Behaviour:
         pushable = phrases.thing(where, "marble", "generator")
         if pushable is not None:
             options += [lambda: f"push({pushable[0]}, {phrases.direction(where)})"] * 3
+        pushed = [name for name in self.declared.pushed if name not in self.declared.groups]
+        if pushed:
+            options.append(lambda: f"push({rng.choice(pushed)}, {phrases.direction(where)})")
         if self.declared.carried:
             held = phrases.one(rng.choice(self.declared.carried), where)
             options += [lambda: rng.choice(("pickup", "drop", "choose(pickup | drop | forward)"))] * 2

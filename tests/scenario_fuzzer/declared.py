@@ -99,6 +99,7 @@ class Declared:
     turns: int = 0  # for how many numbers the table `turns` has a member of the cast
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
     carried: list[Thing] = field(default_factory=list)  # what can be carried
+    pushed: list[str] = field(default_factory=list)  # members and groups of the cast who can be pushed
     looks: list[Look] = field(default_factory=list)
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)

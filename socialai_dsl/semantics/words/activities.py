@@ -175,11 +175,16 @@ def _enter(doing: Doing) -> Activity:
 
 def _push(doing: Doing) -> Activity:
     what = doing.one(0)
+    symbols = doing.resolver.symbols
     for number in what.type.values:
-        objects = doing.resolver.symbols.object_of(number)
-        if objects is None or not objects.type.pushed:
+        objects, member = symbols.object_of(number), symbols.member_of(number)
+        if member is not None and symbols.cast[member].value("pushed_by") is None:
+            message = f"nobody can push `{quoted(doing.args[0])}`"
+            hint = f"with `pushed_by: anybody` in the cast `{member}` goes out of the way"
+            raise doing.fail("S204", message, doing.args[0], hint=hint)
+        if member is None and (objects is None or not objects.type.pushed):
             message = f"`{quoted(doing.args[0])}` cannot be pushed"
-            able = [key for key, type_ in doing.resolver.symbols.types.items() if type_.pushed]
+            able = [key for key, type_ in symbols.types.items() if type_.pushed]
             raise doing.fail("S204", message, doing.args[0], hint="what can be: " + ", ".join(able))
     return doing.activity(what, doing.resolver.value(doing.args[1], DIRECTION, doing.scope))
 
