@@ -258,7 +258,11 @@ class Behaviour:
         pushable = phrases.thing(where, "marble", "generator")
         if pushable is not None:
             options += [lambda: f"push({pushable[0]}, {phrases.direction(where)})"] * 3
-        pushed = [name for name in self.declared.pushed if name not in self.declared.groups]
+        pushed = [
+            name
+            for name in self.declared.pushed
+            if name not in self.declared.groups and self.declared.follows.get(name) is not where.frame
+        ]
         if pushed:
             options.append(lambda: f"push({rng.choice(pushed)}, {phrases.direction(where)})")
         if self.declared.carried:

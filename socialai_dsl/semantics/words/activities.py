@@ -21,6 +21,7 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     TURN,
     CellOf,
+    Const,
     Measure,
     Term,
     Type,
@@ -176,6 +177,8 @@ def _enter(doing: Doing) -> Activity:
 def _push(doing: Doing) -> Activity:
     what = doing.one(0)
     symbols = doing.resolver.symbols
+    if isinstance(what, Const) and symbols.member_of(what.value) == doing.scope.member:
+        raise doing.fail("S204", "nobody walks into itself, so nobody pushes itself", doing.args[0])
     for number in what.type.values:
         objects, member = symbols.object_of(number), symbols.member_of(number)
         if member is not None and symbols.cast[member].value("pushed_by") is None:

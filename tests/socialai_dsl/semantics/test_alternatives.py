@@ -58,7 +58,7 @@ def test_each_key_of_a_member_has_cases_or_is_the_same_in_all_files(mistakes, fi
     values = {
         "kind": "shy", "name": "Pip", "color": "blue", "place": "top_half", "at": "[1, 1]", "facing": "left",
         "view": 5, "earshot": "room", "beliefs": "{d: {of: exit.color}}", "accepts": "agent.spoke",
-        "audible": "always", "kind_code": 9,
+        "audible": "always", "kind_code": 9, "pushed_by": "anybody",
     }  # fmt: skip
     elsewhere = {"role", "frame", "with", "one_of"}
     fields = CastMember.model_fields
@@ -70,7 +70,7 @@ def test_each_key_of_a_member_has_cases_or_is_the_same_in_all_files(mistakes, fi
             differ.add(key)
         else:
             assert found == [], key
-    assert differ == {"view", "earshot", "beliefs", "accepts", "audible"}
+    assert differ == {"view", "earshot", "beliefs", "accepts", "audible", "pushed_by"}
 
 
 def test_a_name_that_is_left_out_in_one_file_leaves_that_of_another_an_expression(meaning, files):
