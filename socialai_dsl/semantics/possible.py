@@ -632,13 +632,17 @@ def _bounds(left: Term, right: Term) -> str:
     )
 
 
+_WRITTEN: Final = {"clock": "turns_in_state", "dir": "facing", "width": "W", "height": "H"}
+"""What terms and registers are called that authors know by another name."""
+
+
 def _called(term: Term) -> str:
     match term:
         case terms.World(name=name) | terms.FieldOf(name=name) | terms.Measure(name=name):
-            return f"`{name}`"
+            return f"`{_WRITTEN.get(name, name)}`"
         case terms.Read(path=path):
             register = path.rpartition(".")[2]
-            return f"`{'turns_in_state' if register == 'clock' else register}`"
+            return f"`{_WRITTEN.get(register, register)}`"
     return "what is compared"
 
 

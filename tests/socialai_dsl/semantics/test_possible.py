@@ -98,6 +98,7 @@ def test_what_a_rule_heard_is_found(examine, hears, say, dead):
         ({"before": 3, "after": 3}, "`turns_in_state` would have to be at least 3 and at most 2"),
         ({"before": 4, "after": 3}, None),
         ({"before": 0}, "`turns_in_state` is from 0 to 20"),
+        ({"when": "W > 8"}, "`W` is from 5 to 8"),
         ({"after": 21}, "`turns_in_state` is from 0 to 20"),
         ({"after": 20}, None),
         ({"before": "told", "after": "told"}, "it asks for something and for its opposite"),
