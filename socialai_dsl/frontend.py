@@ -467,6 +467,7 @@ def check(
     texts: Mapping[Path, Source] | None = None,
     every_value: bool = False,
     tests: bool = True,
+    base: Path | None = None,
 ) -> CheckResult:
     """Check a file, or a scenario of a name; findings are returned, never raised.
 
@@ -475,14 +476,21 @@ def check(
         texts: resolved path -> text, for files that are not on the disk as they are meant: those of an editor.
         every_value: whether a scenario that is right is also checked with the other values of its parameters.
         tests: whether the tests in a scenario's file are checked, too.
+        base: the folder of the file that names it; by default the working directory.
     """
     with bounded_suggestions():
-        return _check(str(name), texts, every_value, tests)
+        return _check(str(name), texts, every_value, tests, base)
 
 
-def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool, tests: bool) -> CheckResult:
+def _check(
+    name: str,
+    texts: Mapping[Path, Source] | None,
+    every_value: bool,
+    tests: bool,
+    base: Path | None,
+) -> CheckResult:
     try:
-        resolved = resolve(name, texts=texts)
+        resolved = resolve(name, folder=base, texts=texts)
     except ScenarioError as error:
         return CheckResult(name, None, None, tuple(DiagnosticBag(error.diagnostics)), error.sources, None)
     bag = DiagnosticBag()
@@ -569,7 +577,7 @@ def _check_played(
     """
     played: dict[str, Loaded] = {}
     for name, written, place in experiment.named():
-        result = check(name)
+        result = check(name, base=experiment.folder)
         span = experiment.resolved.tree.value_span(place)
         if not result.has_errors:
             loaded = _loaded(result)

@@ -11,6 +11,7 @@ from typing import Any
 
 from socialai_dsl import compilation, frontend
 from socialai_dsl.loader import reader
+from socialai_dsl.loader.resolved import shipped_names
 
 _ROOT = Path(__file__).parents[1]
 _KEPT = tuple(str(_ROOT / name) for name in ("tests/data", "scenarios", "experiments", "docs/cookbook"))
@@ -19,16 +20,19 @@ _programs: dict[int, dict[bool, Any]] = {}
 """What was compiled of a scenario, by its identity, with and without probes; `_checked` keeps the scenarios alive."""
 
 
-def check(name: str | Path, texts: Any = None, every_value: bool = False, tests: bool = True) -> Any:
+def check(
+    name: str | Path, texts: Any = None, every_value: bool = False, tests: bool = True, base: Any = None
+) -> Any:
     """`frontend.check`."""
-    lasting = ".yaml" not in str(name) or str(name).startswith(_KEPT)
+    ships = base is None or str(name).partition("+")[0].partition("?")[0] in shipped_names()
+    lasting = (".yaml" not in str(name) and ships) or str(name).startswith(_KEPT)
     if texts is not None or every_value or not lasting:
-        return _check(name, texts, every_value, tests)
+        return _check(name, texts, every_value, tests, base)
     # Findings, and where a rule is written, name files as they are seen from the working directory.
     seen = reader.display_name(reader.shipped_folder())
     result = _checked(str(name), tests, seen)
     # What is wrong with a name depends on what else there is.
-    return _check(name, texts, every_value, tests) if result.has_errors else result
+    return _check(name, texts, every_value, tests, base) if result.has_errors else result
 
 
 @cache

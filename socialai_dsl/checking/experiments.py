@@ -11,7 +11,7 @@ from typing import Final
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.loader.reader import SUFFIXES, display_name
-from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path
+from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names
 from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
@@ -96,9 +96,15 @@ def is_phases(curriculum: str | None) -> bool:
 
 
 def from_anywhere(name: str, folder: Path) -> str:
-    """A name of a scenario or of another file in a file in `folder`, as it is called from any working directory."""
+    """A name of a scenario or of another file in a file in `folder`, as it is called from any working directory.
+
+    What is neither a path nor the name of something that ships means a file beside the one that names it.
+    """
     base = name.partition("?")[0]
-    if not looks_like_path(base.partition("+")[0]):
+    called = base.partition("+")[0]
+    if not looks_like_path(called) and (
+        called in shipped_names() or not (folder / f"{called}.yaml").is_file()
+    ):
         return name
     return os.path.abspath(folder / base) + name[len(base) :]
 

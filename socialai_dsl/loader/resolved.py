@@ -693,7 +693,12 @@ class ResolvedFile:
         return ResolvedFile(self._library, self._build.copy(), {**self._given, **given})
 
 
-def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> ResolvedFile:
+def resolve(
+    name: str,
+    base: Path | None = None,
+    texts: Mapping[Path, Source] | None = None,
+    folder: Path | None = None,
+) -> ResolvedFile:
     """The scenario of a name: `NAME(+VARIANT)*(?parameter=value(&parameter=value)*)?`.
 
     Args:
@@ -702,13 +707,14 @@ def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | 
             come from anywhere below it, else only from the folder of the named file; and always from the shipped
             ones.
         texts: resolved path -> text that stands for the file, which need not exist.
+        folder: where a name is looked for that is no path, by default as relative paths.
 
     Raises:
         ScenarioError: with everything found up to the first file that cannot be used.
     """
     source = name_source(name)
     found = DiagnosticBag()
-    folder = base if base is not None else Path()
+    folder = folder if folder is not None else base if base is not None else Path()
     parsed = parse_name(name, source.span(1, 1), found, folder)
     found.raise_errors({source.name: source})
     path = _named_file(parsed.base, folder, source, texts or {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ import pytest
 from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.document import completed, config_of, differences, document_of
-from socialai_dsl.frontend import load, load_experiment
+from socialai_dsl.frontend import check, load, load_experiment
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.schema.experiment import NETS, Hyper, Settings
 
 ROOT = Path(__file__).parents[3]
@@ -283,3 +285,21 @@ def test_a_guided_condition_takes_from_the_scenario_what_it_does_not_say(
     frames = frames or load("social_env").suite.training_frames  # None: as its file says
     assert (cell.frames, config_of(cell).frames, config_of(cell).curriculum) == (frames, frames, curriculum)
     assert document_of(loaded, None)["conditions"][0]["frames"] == frames
+
+
+def test_a_name_that_is_no_path_means_what_ships_or_stands_beside_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Never what happens to be in the working directory, of which nothing is opened."""
+    there, here = tmp_path / "there", tmp_path / "here"
+    for folder in (there, here):
+        folder.mkdir()
+    shutil.copy(shipped_folder() / "talkitout.yaml", there / "mine.yaml")
+    shutil.copy(shipped_folder() / "talkitout.yaml", here / "yours.yaml")
+    monkeypatch.chdir(here)
+    text = "experiment: e\nset: {frames: 100}\nconditions: [{name: a, scenario: NAME}]\n"
+    (there / "e.yaml").write_text(text.replace("NAME", "mine"), encoding="utf-8")
+    assert check(there / "e.yaml").diagnostics == ()
+    (there / "e.yaml").write_text(text.replace("NAME", "yours"), encoding="utf-8")
+    (finding,) = check(there / "e.yaml").diagnostics
+    assert finding.code == "S504"
