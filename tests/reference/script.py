@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Final
@@ -53,7 +53,7 @@ class Rule:
     to: Any = None
     goto: str | None = None
     goto_now: str | None = None
-    reward: int = 0  # of the world's rules: per cent
+    reward: Any = 0  # of the world's rules: per cent, for all seats or for each member
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,7 @@ class Member:
     pushed_by: str | None = None
     accepts: Any = None
     kind_code: int | None = None
+    seat: str | None = None
 
     def over(self, base: Member) -> Member:
         """This with what it leaves out taken from `base`: a position replaces a place and the other way round."""
@@ -242,7 +243,8 @@ class Outcome:
 
     success: Any = None
     failure: Any = None
-    reward: Any = 100
+    reward: Any = 100  # per cent, for all seats or for each member
+    for_: tuple[str, ...] = ()  # whose success it is; of all if nobody is named
     id: str | None = None
 
 
@@ -387,6 +389,16 @@ class Script:
             member = member.over(replace(role, frame=None) if name == "agent" else role)
         return member if name == "agent" else member.over(self.npc_defaults)
 
+    def seats(self) -> list[str]:
+        """The members that have a seat, the agent first."""
+        others = [name for name in self.cast if name != "agent" and self.versions(name)[0].seat == "open"]
+        return ["agent", *others]
+
+    def named(self, member: str, names: Iterable[str]) -> str | None:
+        """The one of these names that means a member: its own, that of its group, or of its role."""
+        own = (member, member.partition("[")[0])
+        return next((name for name in names if self.player_of(name) in own), None)
+
     def player_of(self, name: str) -> str:
         """The member of the cast that a name means; a role means whoever plays it."""
         players = [member for member, own in self.cast.items() if own.role == name]
@@ -440,6 +452,7 @@ def of_data(
         "skills",
         "notes",
         "published",
+        "results_by",
         "instructions",
         "training_frames",
         "abstract",
@@ -644,7 +657,7 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "rules": rules,
     "require": many,
     "reward": lambda entry: record(Pay, entry, {}),
-    "outcome": lambda entries: tuple(record(Outcome, entry, {}) for entry in entries),
+    "outcome": lambda entries: tuple(record(Outcome, entry, {"for_": many}) for entry in entries),
     "observe": lambda entry: record(Observe, entry, {"channels": many}),
     "probes": each(lambda entry: record(Probe, entry, {"answers": many})),
 }
