@@ -5,7 +5,8 @@ The public surface, imported on first use so that checking a file loads neither 
 * `load(name)`: check a file, or a shipped scenario or suite by name, with variants: `talkitout+unsocial`.
 * `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map; of a suite a `ProgramSuite`.
 * `load_curriculum(path)`: check a file of phases, which says what of a suite is played in training, and when.
-* `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
+* `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised;
+  `make_parallel(name)`: one of PettingZoo, where several members of the cast have a seat.
 * `train(scenario, frames=...)` and `resume(folder)`: train an agent, test it and write the folder of the run, a `Run`.
 * `evaluate(agent, scenario)`, `record(evaluation, folder)`, `replay(run)`, `trace(scenario)` and `report(folders)` do
   what the commands do, with every kind of agent.
@@ -23,7 +24,7 @@ from socialai_dsl import _gymnasium_hook
 if TYPE_CHECKING:
     from socialai_dsl.compilation import compile_loaded as compile
     from socialai_dsl.diagnostics import Diagnostic, ScenarioError
-    from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_vec
+    from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_parallel, make_vec
     from socialai_dsl.episodes.traces import trace
     from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load, load_curriculum
     from socialai_dsl.program import Program
@@ -46,6 +47,7 @@ _HOME = {
     "Program": ("socialai_dsl.program", "Program"),
     "ProgramSuite": ("socialai_dsl.program_suite", "ProgramSuite"),
     "make": ("socialai_dsl.envs", "make"),
+    "make_parallel": ("socialai_dsl.envs", "make_parallel"),
     "make_vec": ("socialai_dsl.envs", "make_vec"),
     "train": ("socialai_dsl.runs.train", "train"),
     "resume": ("socialai_dsl.runs.train", "resume"),
@@ -78,6 +80,7 @@ __all__ = [
     "load",
     "load_curriculum",
     "make",
+    "make_parallel",
     "make_vec",
     "record",
     "replay",

@@ -119,6 +119,13 @@ Playable = Program | ProgramSuite
 """What environments are made of."""
 
 
+def seats_of(playable: Playable) -> tuple[str, ...]:
+    """The members of the cast that players can play, the agent first; of a suite those that all its programs have."""
+    programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
+    names = [tuple(map(str, program.seats)) for program in programs]
+    return names[0] if len(set(names)) == 1 else names[0][:1]
+
+
 def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:
     """The channels of pictures in which several programs are shown: those that one of them has.
 

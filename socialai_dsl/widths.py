@@ -27,3 +27,6 @@ UNSPOKEN: Final = ("<pad>", "<unk>")
 
 MOST_WORDS: Final = 1 << (int(TOKEN.removeprefix("int")) - 1)
 """How many words a vocabulary can have, those two among them."""
+
+MOST_SEATS: Final = 8
+"""How many members of a cast players can play."""

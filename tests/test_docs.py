@@ -44,13 +44,22 @@ def blocks(path: Path, language: str) -> Iterator[str]:
             yield text
 
 
+NAMED = re.compile(r"# (\w+\.yaml)\n")
+"""The first line of a file that a page shows and its examples use."""
+
+
+def save_files(page: Path, folder: Path) -> None:
+    """Save the files that a page shows under their names."""
+    for text in blocks(page, "yaml"):
+        if (first := NAMED.match(text)) is not None:
+            (folder / first[1]).write_text(text, encoding="utf-8")
+
+
 @pytest.fixture
 def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder as a reader of the README would have it: the scenarios it shows are saved under their names."""
     monkeypatch.chdir(tmp_path)
-    for text in blocks(ROOT / "README.md", "yaml"):
-        first = text.splitlines()[0]
-        (tmp_path / first.removeprefix("# ")).write_text(text, encoding="utf-8")
+    save_files(ROOT / "README.md", tmp_path)
     return tmp_path
 
 
@@ -164,6 +173,7 @@ def test_parts_in_the_reference_are_sound(text: str, tmp_path: Path) -> None:
     "page", [page for page in PAGES if page not in (TUTORIAL, INTEROP)], ids=lambda page: page.name
 )
 def test_python_in_the_pages_runs(page: Path, reader: Path) -> None:
+    save_files(page, reader)
     for number, example in enumerate(blocks(page, "python")):
         if "stable_baselines3" in example:
             pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
@@ -190,6 +200,7 @@ def test_commands_in_the_documents_are_understood(
         for words in commands(path)
     ]
     assert len(shown) >= 3
+    save_files(ROOT / "docs" / "partners.md", reader)
     for program, *words in shown:
         if program == "socialai" and words[0] == "validate" and "--deep" not in words:
             assert main.main(words) == 0, words

@@ -81,7 +81,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "render": ({"program", "library", "vocabulary"}, {"numpy", "PIL"}),
     "envs": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "render"},
-        {"numpy", "gymnasium"},
+        {"numpy", "gymnasium", "pettingzoo"},
     ),
     "analysis": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "envs"},

@@ -14,11 +14,11 @@ from tests.tiny import Folder, Play
 
 PAGE = Path(__file__).parents[1] / "docs" / "one_step.md"
 
-EMPTY, DOOR, BALL, NPC, MARBLE = 1, 4, 6, 11, 16
+EMPTY, WALL, DOOR, BALL, NPC, MARBLE = 1, 2, 4, 6, 11, 16
 """Codes of types in the picture."""
 
-BLUE = 2
-"""The code of a colour in the picture."""
+RED, BLUE = 0, 2
+"""Codes of colours in the picture."""
 
 
 @pytest.fixture
@@ -2563,3 +2563,409 @@ def test_12_10_perform_speaks_before_anything_is_set(play: Folder) -> None:
     run = play(text, {"let": {"dance": [["left", "Say hello"]]}})
     heard = [run.step().info["utterance"] for _ in range(2)]
     assert heard == ["Ann: (calm) Say hello", "Ann: (angry) So"]
+
+
+# -- 13. several seats -----------------------------------------------------------------------------
+
+
+def test_13_1_the_agent_has_the_first_seat(play: Folder) -> None:
+    run = play.table("""
+        cast:
+          ann: {at: [5, 5], seat: open}
+          bob: {at: [4, 5]}
+          crew: {count: 2, at: [[1, 5], [2, 5]], seat: open}
+    """)
+    assert run.seats == ["agent", "ann", "crew[0]", "crew[1]"]
+
+
+def test_13_2_a_seat_is_taken_from_one_step_to_the_next(play: Folder) -> None:
+    run = play.table("cast: {ann: {at: [2, 5], facing: right, seat: open}}")
+    run.step(ann="forward")
+    assert run.at("ann") == [3, 5]
+    run.step()
+    assert run.at("ann") == [3, 5], "nobody sits there in this step"
+    run.step(ann="forward", agent="forward")
+    assert (run.at("ann"), run.at("agent")) == ([4, 5], [2, 1])
+
+
+def test_13_3_a_member_whose_seat_is_free_is_an_npc(play: Folder) -> None:
+    run = play.table("""
+        frames: {walk: {states: {s: {do: forward, then: [{say: Here}]}}}}
+        cast: {ann: {at: [2, 5], facing: right, seat: open, frame: walk}, bob: {at: [2, 4], seat: open}}
+    """)
+    run.step()
+    assert (run.at("ann"), run.at("bob")) == ([3, 5], [2, 4])
+    assert run.heard("agent") == ["Ann: Here"]
+
+
+def test_13_4_all_act_on_one_state_and_are_known_from_its_start(play: Folder) -> None:
+    run = play.table("""
+        frames:
+          watch:
+            let: {moved: false, talked: false, greeted: false}
+            states:
+              s:
+                first:
+                  - set: {moved: bob.action == forward, talked: bob.spoke, greeted: bob.said("Say hello")}
+        cast: {ann: {at: [5, 5], frame: watch}, bob: {at: [2, 4], facing: right, seat: open}}
+    """)
+    names = ("ann.moved", "ann.talked", "ann.greeted")
+    run.step(bob=("forward", "Say hello"))
+    assert [run.value(name) for name in names] == [True, True, True]
+    run.step()
+    assert [run.value(name) for name in names] == [False, False, False]
+    run = play.table("""
+        frames:
+          watch: {states: {s: {first: [{set: {before: bob.action == left}}]}}}
+          pace: {states: {s: {do: left}}}
+        state: {before: false, later: false}
+        rules: [{set: {later: bob.action == left}}]
+        cast:
+          agent: {frame: watch}
+          bob: {at: [2, 4], seat: open, frame: pace}
+    """)
+    run.step()
+    assert (run.value("before"), run.value("later")) == (False, True)
+    assert run.step().value("before"), "on a free seat it is that of the last turn"
+
+
+def test_13_5_bodies_move_in_the_order_of_the_seats(play: Folder) -> None:
+    run = play.table("""
+        cast: {ann: {at: [3, 1], facing: left, seat: open}, bob: {at: [1, 2], facing: up, seat: open}}
+    """)
+    run.step(agent="forward", ann="forward", bob="forward")
+    assert [run.at(name) for name in ("agent", "ann", "bob")] == [[2, 1], [3, 1], [1, 1]]
+
+
+def test_13_6_who_is_played_has_the_body_of_the_agent(play: Folder) -> None:
+    run = play.table("""
+        objects:
+          door: {type: door, at: [0, 5]}
+          coin: {type: ball, at: [1, 3], carryable: true}
+          marble: {type: marble, at: [4, 3]}
+        room: {build: [{lava: column(5)}]}
+        cast:
+          ann: {at: [1, 5], facing: left, seat: open}
+          bob: {at: [1, 4], facing: up, seat: open}
+          cat: {at: [3, 3], facing: right, seat: open}
+          dan: {at: [4, 2], facing: right, seat: open}
+    """)
+    run.step(ann="toggle", bob="pickup", cat="forward", dan="forward")
+    assert run.state["door"]["state"] == "open"
+    assert (run.at("coin"), run.at("cat")) == (None, [3, 3])
+    assert run.at("dan") is None, "it may step onto what is deadly"
+    assert run.state["marble"]["state"] == "still", "it has rolled against the lava in the same step"
+    run = play.table("""
+        cast: {agent: {pushed_by: anybody}, ann: {at: [1, 3], facing: up, seat: open}, bob: {at: [3, 1], seat: open}}
+    """)
+    run.step(ann="forward").step(ann="forward")
+    assert (run.at("ann"), run.at("agent")) == ([1, 2], [1, 1]), "behind the agent is the wall"
+    run.step(agent="forward", ann="forward").step(ann="right").step(ann="forward")
+    assert (run.at("ann"), run.at("agent")) == ([1, 1], [2, 1]), "and here bob"
+    run.step(agent="right").step(agent="forward", ann="forward").step(ann="right").step(ann="forward")
+    assert (run.at("ann"), run.at("agent")) == ([2, 1], [2, 3]), "it was pushed down"
+
+
+@pytest.mark.parametrize(("npcs", "meet"), [("shown", False), ("hidden", True)])
+def test_13_7_nobody_enters_the_cell_of_another_unless_npcs_are_hidden(
+    play: Folder, npcs: str, meet: bool
+) -> None:
+    run = play.table(f"""
+        observe: {{npcs: {npcs}}}
+        cast: {{ann: {{at: [1, 2], facing: up, seat: open}}, bob: {{at: [2, 1], facing: down, seat: open}}}}
+    """)
+    run.step(ann="forward", agent="forward")
+    assert (run.at("ann") == [1, 1], run.at("agent") == [2, 1]) == (meet, meet)
+    run.step(ann="right").step(ann="forward")
+    assert (run.at("ann") == run.at("bob")) is meet
+
+
+def test_13_8_a_toggle_pokes_npcs_and_members_with_a_seat(play: Folder) -> None:
+    run = play.table("""
+        objects: {door: {type: door, at: [1, 1], state: open}}
+        cast:
+          ann: {at: [1, 2], facing: up, seat: open}
+          bob: {at: [1, 3], facing: up, seat: open}
+          cat: {at: [1, 4], facing: up, seat: open}
+          dan: {at: [2, 4], facing: left, seat: open}
+          eve: {at: [2, 3]}
+        state: {a: false, b: false, e: false}
+        rules: [{set: {a: ann.poked, b: bob.poked, e: eve.poked}}]
+    """)
+    run.step(bob="toggle")
+    assert [run.value(who) for who in ("a", "b", "e")] == [True, False, False]
+    run.step(dan="right").step(dan="toggle")
+    assert [run.value(who) for who in ("a", "b", "e")] == [False, False, True]
+    run.step(ann="toggle")
+    assert run.state["door"]["state"] == "closed", "the agent is not poked, and stands in the door"
+
+
+TOGGLED = """
+    objects: {lamp: {type: switch, at: [0, 5]}}
+    frames:
+      use: {states: {s: {do: toggle}}}
+      watch:
+        let: {by_bob: false, touched: false}
+        states: {s: {then: [{set: {by_bob: lamp.toggled_by(bob), touched: lamp.poked}}]}}
+    cast: {ann: {at: [5, 5], frame: watch}, bob: {at: [1, 5], facing: left, seat: open, frame: use}}
+    rules: [{set: {poked_now: lamp.poked, by: lamp.toggled_by(bob)}}]
+    state: {poked_now: false, by: false}
+"""
+
+
+def test_13_9_what_a_player_toggled_at_is_toggled_by_it_until_the_next_step(play: Folder) -> None:
+    run = play.table(TOGGLED)
+    run.step(bob="toggle")
+    assert run.value("ann.by_bob"), "its turn comes after that of ann"
+    run.step(bob=None)
+    assert not run.value("ann.by_bob"), "with the next step it is over"
+    run.step(bob="toggle").step()
+    assert not run.value("ann.by_bob"), "also where nobody sits there any more"
+    assert run.value("by"), "and its frame toggles in its own turn"
+
+
+def test_13_10_what_a_member_with_a_seat_toggled_at_is_poked(play: Folder) -> None:
+    run = play.table(TOGGLED)
+    run.step(bob="toggle")
+    assert (run.value("ann.touched"), run.value("poked_now")) == (True, True)
+    run.step()
+    assert (run.value("ann.touched"), run.value("poked_now")) == (False, True), (
+        "in its turn, after that of ann"
+    )
+    run.step(bob="left")
+    assert not run.value("poked_now")
+
+
+def test_13_11_the_world_goes_on_once_after_all_bodies(play: Folder) -> None:
+    run = play.table("""
+        objects:
+          marble: {type: marble, at: [1, 4]}
+          crank: {type: lever, at: [0, 5], timer: 2}
+        cast: {ann: {at: [1, 5], facing: left, seat: open}, bob: {at: [1, 3], facing: down, seat: open}}
+    """)
+    run.step(agent="forward", bob="forward", ann="toggle")
+    assert run.state["marble"]["state"] == "still", "ann is in its way"
+    assert run.state["crank"]["state"] == "up"
+    run.step(bob="left")
+    assert run.state["crank"]["state"] == "spent", "it counts once a step, from this one on"
+
+
+def test_13_12_players_speak_after_the_agent_and_its_frame(play: Folder) -> None:
+    run = play.table("""
+        observe: {own_voice: true}
+        frames:
+          script: {let: {heard_it: false}, states: {s: {then: [{when: heard(any), set: {heard_it: true}}]}}}
+        cast: {agent: {frame: script}, ann: {at: [5, 5], seat: open}, bob: {at: [4, 5], seat: open}}
+    """)
+    run.step(bob=("left", "Say bye"), ann=("left", "Say hello"), agent=("left", "Say bye"))
+    assert run.heard("agent") == ["Agent: Say bye", "Ann: Say hello", "Bob: Say bye"]
+    assert not run.value("agent.heard_it"), "its frame went on before they spoke"
+    run.step()
+    assert run.value("agent.heard_it")
+
+
+def test_13_13_a_voice_is_heard_within_its_earshot(play: Folder) -> None:
+    run = play.table("""
+        frames: {listen: {let: {got: 0}, states: {s: {then: [{hears: any, set: {got: "min(got + 1, 9)"}}]}}}}
+        cast:
+          ann: {at: [1, 3], facing: up, earshot: 2, seat: open}
+          bob: {at: [1, 4], seat: open}
+          cat: {at: [1, 5], frame: listen}
+          dan: {at: [2, 5], frame: listen}
+    """)
+    run.step(ann=("forward", "Say hello"))
+    assert [run.heard(seat) for seat in run.seats] == [["Ann: Say hello"], [], ["Ann: Say hello"]]
+    assert (run.value("cat.got"), run.value("dan.got")) == (0, 0), "it spoke where its body had moved to"
+    run.step(ann="left").step(ann="left").step(ann=("forward", "Say bye"))
+    assert [run.heard(seat) for seat in run.seats] == [["Ann: Say bye"], [], ["Ann: Say bye"]]
+    assert (run.value("cat.got"), run.value("dan.got")) == (1, 0)
+    run = play.table("""
+        observe: {tone: mood}
+        looks: {mood: {for: cast, words: [calm, angry], start: calm}}
+        frames: {script: {states: {s: {then: [{set: {ann.mood: angry}}]}}}}
+        cast: {agent: {frame: script}, ann: {at: [5, 5], seat: open}}
+    """)
+    run.step(ann=(None, "Say bye"), agent=(None, "Say bye"))
+    assert (run.heard("agent"), run.heard("ann")) == (["Ann: (calm) Say bye"], ["Agent: Say bye"])
+    assert run.step(ann=(None, "Say bye")).heard("agent") == ["Ann: (angry) Say bye"]
+
+
+def test_13_14_every_seat_hears_npcs_in_the_order_spoken(play: Folder) -> None:
+    text = """
+        observe: {{own_voice: {}}}
+        frames: {{talk: {{slots: {{line: text}}, states: {{s: {{then: [{{say: <line>}}]}}}}}}}}
+        cast:
+          ann: {{at: [5, 5], seat: open}}
+          bob: {{at: [4, 5], frame: talk, with: {{line: Yes}}}}
+          cat: {{at: [3, 5], frame: talk, with: {{line: No}}}}
+    """
+    run = play.table(text.format("false")).step(ann=("left", "Say hello"), agent=("left", "Say bye"))
+    assert run.heard("agent") == ["Ann: Say hello", "Bob: Yes", "Cat: No"]
+    assert run.heard("ann") == ["Agent: Say bye", "Bob: Yes", "Cat: No"]
+    run = play.table(text.format("true")).step(ann=("left", "Say hello"), agent=("left", "Say bye"))
+    assert run.heard("ann") == run.heard("agent")
+    assert run.heard("ann") == ["Agent: Say bye", "Ann: Say hello", "Bob: Yes", "Cat: No"]
+    run = play.table("""
+        observe: {own_voice: true}
+        frames: {talk: {states: {s: {then: [{say: Yes}]}}}}
+        cast: {ann: {at: [5, 5], seat: open, frame: talk}}
+    """)
+    assert (run.step().heard("agent"), run.heard("ann")) == (["Ann: Yes"], []), "its script is not its player"
+
+
+def test_13_15_while_npcs_are_hidden_others_are_neither_seen_nor_heard(play: Folder) -> None:
+    run = play.table("""
+        observe: {npcs: hidden}
+        cast:
+          ann: {at: [3, 1], facing: left, seat: open}
+          bob: {at: [5, 5], seat: open, audible: always}
+    """)
+    run.step(agent=("left", "Say hello"), ann=("done", "Say hello"), bob=("left", "Say bye"))
+    assert [run.heard(seat) for seat in run.seats] == [["Bob: Say bye"], ["Bob: Say bye"], []]
+    assert run.shown("ann", 2)[0] == EMPTY, "there is the agent"
+
+
+def test_13_16_who_is_played_follows_its_frame_without_body_and_voice(play: Folder) -> None:
+    run = play.table("""
+        frames:
+          act:
+            let: {told: 0}
+            states:
+              s:
+                do: forward
+                then:
+                  - set: {told: "min(told + 1, 9)", seen: bob.believes.x_of_agent}
+                    cause: [lamp.become(pressed)]
+                    say: Here
+        state: {seen: 0}
+        objects: {lamp: {type: switch, at: [0, 5]}}
+        cast:
+          bob:
+            at: [2, 3]
+            facing: right
+            seat: open
+            frame: act
+            beliefs: {x_of_agent: {of: agent.x}}
+    """)
+    run.step(agent="forward", bob=None)
+    assert (run.at("bob"), run.heard("agent")) == ([2, 3], [])
+    assert (run.value("bob.told"), run.value("seen"), run.state["lamp"]["state"]) == (1, 2, "pressed")
+
+
+def test_13_17_a_script_goes_on_from_where_things_are(play: Folder) -> None:
+    run = play.table("""
+        frames:
+          greet:
+            states:
+              waiting: {then: [{hears: Say hello, goto: going}]}
+              going: {do: forward, then: [{say: On my way}]}
+        cast: {bob: {at: [2, 3], facing: right, seat: open, frame: greet}}
+    """)
+    run.step(agent=("left", "Say hello"), bob="left")
+    assert (run.state["bob"]["state"], run.at("bob")) == ("going", [2, 3])
+    run.step()
+    assert (run.at("bob"), run.heard("agent")) == ([2, 2], ["Bob: On my way"])
+
+
+def test_13_18_who_is_on_a_deadly_cell_vanishes(play: Folder) -> None:
+    run = play.table("""
+        room: {build: [{lava: column(2)}]}
+        objects: {light: {type: ball, at: [5, 5], tagged: agent.gone}}
+        rules: [{set: {was_there: not agent.gone}}]
+        state: {was_there: false}
+        cast: {ann: {at: [3, 3], facing: left, seat: open}, bob: {at: [5, 1], seat: open}}
+    """)
+    run.step(agent="forward", bob="left")
+    assert run.at("agent") is None
+    assert run.value("was_there"), "it is there when the rules of the world are read"
+    assert run.state["light"]["state"] == "tagged", "the world is settled then"
+    run.step(ann="forward", bob="left")
+    assert (run.at("ann"), run.at("bob"), run.terminated.any()) == (None, [5, 1], False)
+
+
+def test_13_19_with_the_last_who_is_played_the_episode_ends(play: Folder) -> None:
+    text = """
+        room: {build: [{lava: column(2)}]}
+        cast: {ann: {at: [3, 3], facing: left, seat: open}}
+        outcome: [{failure: agent.gone, id: alone}]
+    """
+    run = play.table(text).step(agent="forward", ann=None)
+    assert run.outcome == "alone", "of two one is left, and the outcome is read"
+    run = play.table(text).step(agent="forward", ann="forward")
+    assert (run.outcome, run.terminated.tolist()) == ("deadly", [True, True])
+    run = play.table(text).step(agent="forward")
+    assert run.outcome == "deadly", "nobody sits on the other seat"
+
+
+def test_13_20_who_is_out_of_the_room_does_says_and_hears_nothing(play: Folder) -> None:
+    run = play.table("""
+        objects: {door: {type: door, at: [0, 3]}}
+        rules:
+          - {when: t == 1, cause: [ann.vanish]}
+          - {when: t == 3, cause: [ann.put(door.cell), ann.reset]}
+          - {when: ann.spoke or ann.did(toggle), set: {acted: acted + 1}}
+        state: {acted: {start: 0, range: 0..9}}
+        cast: {ann: {at: [1, 3], facing: left, seat: open}, bob: {at: [5, 5], seat: open}}
+    """)
+    run.step(ann="right").step(ann=("toggle", "Say hello"), bob=("left", "Say bye"))
+    assert (run.value("acted"), run.state["door"]["state"]) == (0, "closed")
+    assert [run.heard(seat) for seat in run.seats] == [["Bob: Say bye"], [], []]
+    assert {tuple(run.shown("ann", ahead, 1)) for ahead in range(7)} == {(WALL, 5, 0, 0)}
+    run.step(ann=("toggle", "Say hello"))
+    assert run.at("ann") == [1, 3], "it came back at the end of this step"
+    assert run.value("acted") == 0
+    run.step(ann=("toggle", "Say hello"))
+    assert (run.value("acted"), run.state["door"]["state"]) == (1, "open")
+
+
+def test_13_21_an_outcome_ends_it_for_all_and_may_be_the_success_of_some(play: Folder) -> None:
+    run = play.table("""
+        cast: {ann: {at: [5, 5], seat: open}, bob: {at: [4, 5], seat: open}}
+        outcome: [{success: ann.spoke, for: [ann, agent], id: won}]
+    """)
+    run.step(ann=(None, "Say bye"))
+    assert (run.terminated.tolist(), run.outcome) == ([True, True, True], "won")
+    assert run.infos["success"].tolist() == [True, True, False]
+
+
+def test_13_22_each_seat_is_paid_its_share(play: Folder) -> None:
+    cast = "cast: {ann: {at: [5, 5], seat: open}, bob: {at: [4, 5], seat: open}}"
+    run = play.table(f"""
+        {cast}
+        reward: {{success: linear(0), each_step: 0.5}}
+        rules: [{{when: t == 1, reward: {{ann: 10, bob: -20}}}}, {{when: t == 1, reward: 1}}]
+        outcome: [{{success: t == 2, reward: {{agent: 100, bob: 20 * t}}}}]
+    """)
+    assert run.step(ann=None).reward.tolist() == pytest.approx([0.51, 0.61, 0.31])
+    assert run.step(bob=None).reward.tolist() == pytest.approx([1.5, 0.5, 0.9])
+    run = play.table(f"""
+        {cast}
+        reward: {{success: linear(0)}}
+        outcome: [{{success: t == 1, for: ann, reward: 60}}]
+    """)
+    assert run.step().reward.tolist() == pytest.approx([0, 0.6, 0])
+
+
+def test_13_23_a_picture_shows_the_room_from_where_its_member_stands(play: Folder) -> None:
+    run = play.table("""
+        cast:
+          agent: {color: blue, kind: boss}
+          ann: {at: [3, 1], facing: left, seat: open, color: red}
+          bob: {at: [1, 1], facing: up, color: green}
+          cat: {at: [3, 4], facing: up, seat: open}
+    """)
+    assert run.shown("ann", 2) == [NPC, BLUE, 1, 0], "the agent before the NPC in its cell"
+    assert run.shown("cat", 3) == [NPC, RED, 0, 2]
+    assert run.shown("agent", 2) == [NPC, RED, 0, 2]
+
+
+def test_13_24_its_own_cell_tells_a_player_on_which_seat_it_sits(play: Folder) -> None:
+    run = play.table("""
+        objects: {coin: {type: ball, color: blue, carryable: true, inside: bob}}
+        cast: {ann: {at: [5, 5], seat: open}, bob: {at: [4, 5], seat: open}}
+    """)
+    assert [run.shown(seat, 0)[:4] for seat in run.seats] == [
+        [EMPTY, 0, 0, 0],
+        [EMPTY, 0, 0, 1],
+        [BALL, BLUE, 0, 2],
+    ]

@@ -8,7 +8,7 @@ about what the comparison cannot see, such as short code and sound tables.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,18 +24,23 @@ from socialai_dsl.program import TESTS, FrameColumn, Header, Op, OpClass, Progra
 from socialai_dsl.program.instructions import TABLE
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, RulePlan
-from tests.agreement import Disagreement, Pair, agree
+from tests.agreement import Disagreement, Pair, agree, seats_agree
 from tests.quick import one_in
 from tests.reference import bodies
 from tests.reference.interpreter import Action, Reference, Result
+from tests.reference.world import Entity
 
 SAMPLES = Path(__file__).parent / "data" / "agreement"
 COUNTING = str(SAMPLES / "counting.yaml")
 WALKERS = str(SAMPLES / "walkers.yaml")
 CROWD = str(SAMPLES / "crowd.yaml")
 PERILS = str(SAMPLES / "perils.yaml")
+CREW = str(SAMPLES / "crew.yaml")
+LOOKOUTS = str(SAMPLES / "lookouts.yaml")
+PARTNERS = str(SAMPLES / "partners.yaml")
 SHIPPED_SAMPLES = ("talkitout+oracle", "showme+oracle", "school/boxes+pointing", "novel/interpreter")
 EPISODES = 60
+STEPS = 800
 
 Change = Callable[[CheckedScenario], CheckedScenario]
 
@@ -263,10 +268,10 @@ class SpeaksBeforeMoving(Reference):
         early = [(npc, npc.cell) for npc in self.world.npcs]
         assert early, "this needs NPCs"
         utter, primitive = self.utter, self.primitive
-        self.utter = lambda _: None  # type: ignore[method-assign]
+        self.utter = lambda *_: None  # type: ignore[method-assign]
 
         def speak_then_move(chosen: Action) -> str:
-            utter(chosen)
+            utter(self.world.agent, chosen)
             return primitive(chosen)
 
         self.primitive = speak_then_move  # type: ignore[method-assign]
@@ -279,11 +284,11 @@ class SpeaksBeforeMoving(Reference):
 class PaysForTheStepBefore(Reference):
     """Computes the reward with t before the step."""
 
-    def judge(self) -> Result:
+    def judge(self) -> list[Result]:
         self.world.t -= 1
-        result = super().judge()
+        results = super().judge()
         self.world.t += 1
-        return result
+        return results
 
 
 def play_all(pair: Pair) -> None:
@@ -301,6 +306,111 @@ def test_a_wrong_order_of_events_is_found_out(wrong: type[Reference], name: str)
     pair.reference = wrong(loaded.scenario)
     with pytest.raises(Disagreement):
         play_all(pair)
+
+
+# -- several seats -----------------------------------------------------------------------------------------------
+
+
+def seats_in_reverse(checked: CheckedScenario) -> CheckedScenario:
+    return replace(checked, seated=checked.seated[::-1])
+
+
+def all_for_all(checked: CheckedScenario) -> CheckedScenario:
+    return replace(checked, outcomes=tuple(replace(outcome, seats=None) for outcome in checked.outcomes))
+
+
+PLANTED_IN_SEATS: dict[str, tuple[str, Change]] = {
+    "the order of the seats": (CREW, seats_in_reverse),
+    "a voice carries one cell too far": (CREW, farther),
+    "a success is one of all": (PARTNERS, all_for_all),
+    "a player hears nothing of what it says": (PARTNERS, lambda checked: replace(checked, own_voice=False)),
+    "the picture is taken before the NPCs act": (
+        CREW,
+        lambda checked: replace(checked, picture_before_npcs=not checked.picture_before_npcs),
+    ),
+}
+
+
+@pytest.mark.parametrize("bug", one_in(3, PLANTED_IN_SEATS, "plays on the slow interpreter"))
+def test_a_wrong_compiler_of_seats_is_found_out(bug: str) -> None:
+    name, change = PLANTED_IN_SEATS[bug]
+    loaded = load(name)
+    wrong = change(loaded.checked)
+    assert wrong != loaded.checked, "nothing was planted"
+    with pytest.raises((Disagreement, InvalidProgramError)):
+        seats_agree(loaded, STEPS, seed=5, program=compile_scenario(wrong))
+
+
+class MoveInReverse(Reference):
+    """The last seat moves first."""
+
+    def move(self, players: list[Entity], actions: Mapping[str, Action]) -> None:
+        super().move(players[::-1], actions)
+
+
+class SpeakInReverse(Reference):
+    """The last seat speaks first."""
+
+    def speak(self, players: list[Entity], actions: Mapping[str, Action]) -> None:
+        super().speak(players[::-1], actions)
+
+
+class ScriptsMoveAsWell(Reference):
+    """The frame of a member that is played has its body and its voice."""
+
+    def npc_turn(self, npc: Entity) -> None:
+        taken, npc.taken = npc.taken, False
+        super().npc_turn(npc)
+        npc.taken = taken
+
+
+class ScriptsRest(Reference):
+    """The frame of a member that is played waits."""
+
+    def npc_turn(self, npc: Entity) -> None:
+        if not npc.taken:
+            super().npc_turn(npc)
+
+
+class NobodyDies(Reference):
+    """Nothing happens on deadly cells."""
+
+    def die(self) -> int:
+        return 0
+
+
+class TheDeadAct(Reference):
+    """Who is out of the room is known for what it does and says."""
+
+    def is_played(self, seat: Entity) -> bool:
+        return seat.taken
+
+
+class UsesLast(Reference):
+    """What a player toggled at stays so in the next step."""
+
+    def begin_step(self, played: Collection[str]) -> None:
+        uses = [(thing, list(thing.toggled_by)) for thing in self.world.things()]
+        super().begin_step(played)
+        for thing, users in uses:
+            thing.toggled_by = [user for user in users if user is not self.world.agent]
+
+
+IN_SEATS: dict[type[Reference], str] = {
+    MoveInReverse: PARTNERS,
+    SpeakInReverse: LOOKOUTS,
+    ScriptsMoveAsWell: PARTNERS,
+    ScriptsRest: PARTNERS,
+    NobodyDies: CREW,
+    TheDeadAct: CREW,
+    UsesLast: LOOKOUTS,
+}
+
+
+@pytest.mark.parametrize("wrong", one_in(4, IN_SEATS, "plays on the slow interpreter"))
+def test_a_wrong_engine_of_seats_is_found_out(wrong: type[Reference]) -> None:
+    with pytest.raises(Disagreement):
+        seats_agree(load(IN_SEATS[wrong]), STEPS, seed=5, judge=wrong)
 
 
 def test_a_wrong_choice_among_equal_paths_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:

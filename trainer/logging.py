@@ -74,7 +74,7 @@ class Metrics:
             "frames_per_second": round(config.frames_per_update / (self._time - began), 1),
             **losses,
             "bonus": tally.bonus,
-            **episode_metrics(tally, before, self._counted),
+            **episode_metrics(tally, before, self._counted, session.seats),
         }
         if config.guide == "none":
             row.pop("imitation_loss", None)  # algorithms have figures of their own
@@ -83,21 +83,24 @@ class Metrics:
         return row | {"led": tally.led_steps / config.frames_per_update, "agreement": agreement}
 
 
-def episode_metrics(tally: Tally, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+def episode_metrics(
+    tally: Tally, before: Mapping[str, Any], after: Mapping[str, Any], seats: int = 1
+) -> dict[str, Any]:
     """The figures of the episodes that ended in one rollout; rates are None where none ended.
 
     Args:
         tally: the trainer's sums, of the agent's own episodes.
         before: the environments' `counters()` before the rollout, of own and led episodes.
         after: the same after it.
+        seats: in how many environments the agent plays each episode; what is counted of it is counted once.
     """
 
-    def rate(total: float, episodes: int = tally.episodes) -> float | None:
+    def rate(total: float, episodes: float = tally.episodes) -> float | None:
         return total / episodes if episodes else None
 
     def rates(kind: str) -> dict[str, float | None]:
         counts = {name: count - before[kind].get(name, 0) for name, count in after[kind].items()}
-        return {name: rate(count, tally.all_episodes) for name, count in counts.items()}
+        return {name: rate(count, tally.all_episodes / seats) for name, count in counts.items()}
 
     return {
         "episodes": tally.episodes,

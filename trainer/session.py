@@ -47,6 +47,11 @@ _NEEDED = (
 _WORDS = ("actions", "templates", "nouns", "vocabulary")
 
 
+def _seats_of(envs: Any) -> int:
+    """How many rows of a vector environment play one game."""
+    return int(envs.num_envs) // int(getattr(envs, "num_games", envs.num_envs))
+
+
 @dataclass
 class State:
     """The environments as the agent last met them: what one rollout hands to the next.
@@ -105,6 +110,11 @@ class Session:
         return self.update * self.config.frames_per_update
 
     @property
+    def seats(self) -> int:
+        """How many environments play one game, each of them from another seat."""
+        return _seats_of(self.envs)
+
+    @property
     def progress(self) -> float:
         """Share of the run's frames made so far, 0 to 1."""
         return min(self.frames / self.config.frames, 1.0)
@@ -132,7 +142,8 @@ class Session:
         if config.curriculum != "none":
             tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs), folder), envs)
         bonus = build_bonus(config, config.envs)
-        observation, _ = envs.reset(seed=config.seed, options={"index": list(range(config.envs))})
+        games = config.envs // _seats_of(envs)
+        observation, _ = envs.reset(seed=config.seed, options={"index": list(range(games))})
         guide = build_guide(config, envs)
         if tutor is not None:
             tutor.begin()

@@ -18,6 +18,7 @@ from socialai_dsl.program import (
     Field,
     Op,
     RegisterName,
+    SeatRegister,
 )
 from socialai_dsl.program.instructions import TABLE
 from socialai_dsl.semantics.plans import CheckedScenario, Drawn, Entity, FramePlan, MemoryPlan
@@ -291,6 +292,11 @@ def age_path(belief: str) -> str:
 def said_path(speaker: Entity) -> str:
     """The register of what an NPC has said in this step: 1 + the line, 0 nothing."""
     return f"{label(speaker)}.said"
+
+
+def seat_path(member: Entity, which: SeatRegister) -> str:
+    """A register of a seat other than the agent's."""
+    return f"{label(member)}.seat.{which.name.lower()}"
 
 
 def state_names(frame: FramePlan) -> tuple[str, ...]:

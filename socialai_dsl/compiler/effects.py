@@ -17,6 +17,7 @@ from socialai_dsl.compiler.assembler import (
     found_path,
     label,
     said_path,
+    seat_path,
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
@@ -24,7 +25,7 @@ from socialai_dsl.compiler.folding import FALSE, fold_whole
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, MemberSelection, sizes
-from socialai_dsl.program import CELL, Field, Op, Register, constant
+from socialai_dsl.program import CELL, Field, Op, Register, SeatRegister, constant
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.changes import Mobility
 from socialai_dsl.semantics.plans import (
@@ -39,6 +40,7 @@ from socialai_dsl.semantics.plans import (
 )
 from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, SitedTerm, Term, Type, numbers_of
 from socialai_dsl.semantics.words import EFFECTS
+from socialai_dsl.widths import LARGEST_NUMBER
 
 # -- what the effect `reset` puts back -----------------------------------------------------------------------
 
@@ -258,14 +260,24 @@ class Effects:
                 self.to.store(item.paths[0], operand, _empties(item), key)
         if any(path in self.read for item in what.sets for path in item.paths):
             block.emit(Op.LOAD, Register.CHANGED, constant(1))
-        if isinstance(what, RulePlan) and what.reward:
+        if isinstance(what, RulePlan) and (what.reward or what.rewards):
             block.emit(Op.REWARD, constant(what.reward))
+            self._reward_seats(what.rewards)
         for effect, targets, value in zip(what.causes, operands.targets, operands.values, strict=True):
             for i, (term, entity) in enumerate(zip(effect.entities, targets, strict=True)):
                 with only(effect.only[i] if effect.only else None):
                     self._cause(effect, term, entity, value)
         if operands.line is not None and speaker is not None and what.say is not None:
             self.lines.speak(self.to, speaker, operands.line, what.say)
+
+    def _reward_seats(self, rewards: tuple[int, ...]) -> None:
+        """Add to what the seats other than the agent's get in this step."""
+        for number, reward in zip(self.checked.seated, rewards, strict=False):
+            register = self.registers.by_path[seat_path(self.checked.entities[number], SeatRegister.BONUS)]
+            with self.to.block.scratch():
+                total = self.to.into_temporary(Op.ADD, register, constant(reward))
+                total = self.to.into_temporary(Op.MAX, total, constant(-LARGEST_NUMBER))
+                self.to.block.emit(Op.MIN, register, total, constant(LARGEST_NUMBER))
 
     def _steady(self, value: int, what: RulePlan | StepPlan) -> int:
         """The operand of a value that nothing the rule sets can change."""

@@ -414,8 +414,8 @@ class Lines:
     """The line table.
 
     Attributes:
-        texts: text of each line as the agent hears it. classes: utterance class to NPCs. nouns: what `<noun>` is in it,
-        -1 nothing.
+        texts: text of each line as it is heard. said: without who says it and how. classes: utterance class to NPCs.
+        nouns: what `<noun>` is in it, -1 nothing.
         agent_says: 1 + number of the agent's utterance (0, 0) where the agent's utterances are lines; else 0.
         speakers: for each entity that says something, the numbers of its lines.
         kept_secret: the lines that the agent never hears, for they are said to others.
@@ -424,6 +424,7 @@ class Lines:
     checked: CheckedScenario
     classes_of: Classes
     texts: list[str] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
     classes: list[int] = field(default_factory=list)
     nouns: list[int] = field(default_factory=list)
     agent_says: int = 0
@@ -436,8 +437,13 @@ class Lines:
             int, tuple[str, str]
         ] = {}  # where lines are marked, the mark of each and what follows it
         self.grammar = self.checked.sentences.by_number()
-        if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
+        if self._agent_is_heard or any(frame.entity == 0 for frame in self.checked.frames):
             self._add_agent()
+
+    @property
+    def _agent_is_heard(self) -> bool:
+        """Whether a player hears what the agent says."""
+        return self.checked.own_voice or bool(self.checked.seated)
 
     def _add_agent(self) -> None:
         self.agent_says = 1 + len(self.texts)
@@ -456,6 +462,7 @@ class Lines:
         shown = self.checked.names_shown
         line = len(self.texts)
         self.texts.append(f"{name}: {tone}{text}" if shown else f"{tone}{text}")
+        self.said.append(text)
         if self.checked.lines_marked:
             rest = f"to {to[1]}: {tone}{text}" if to and shown else f"{tone}{text}"
             self._marked[line] = mark_of(called if shown else None), rest
@@ -476,7 +483,8 @@ class Lines:
 
     def adopt(self, other: Lines) -> None:
         """Number all lines as `other` does, which was made for the same scenario."""
-        self.texts, self.classes, self.nouns = [*other.texts], [*other.classes], [*other.nouns]
+        self.texts, self.said = [*other.texts], [*other.said]
+        self.classes, self.nouns = [*other.classes], [*other.nouns]
         self._known, self._marked = dict(other._known), dict(other._marked)
         self.kept_secret = set(other.kept_secret)
         self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
@@ -664,6 +672,8 @@ class Lines:
     def _telling(self) -> list[str]:
         """What tells the lines apart that the agent can hear, and the names of who says them."""
         heard = set().union(*(self.speakers[speaker] for speaker in self._heard_speakers)) - self.kept_secret
+        # A filling that is no utterance has a number, and no text.
+        heard = {line for line in heard if self.said[line]}
         lines = [self._marked.get(line, ("", self.texts[line]))[1] for line in sorted(heard)]
         called = self.checked.names_shown and not self.checked.lines_marked
         names = [line.partition(":")[0] for line in lines] if called else []
@@ -671,7 +681,7 @@ class Lines:
 
     @property
     def _heard_speakers(self) -> list[int]:
-        return [speaker for speaker in self.speakers if speaker != 0 or self.checked.own_voice]
+        return [speaker for speaker in self.speakers if speaker != 0 or self._agent_is_heard]
 
     @property
     def history_length(self) -> int:
@@ -685,6 +695,8 @@ class Lines:
 
 def note_what_is_said(checked: CheckedScenario, lines: Lines, registers: Registers) -> None:
     """For conditions on an NPC's lines: find all its lines, and allocate a register for the last one."""
+    for number in checked.seated:
+        lines.first_performed(checked.entities[number])
     asked = list(every(SaidBy, checked))
     if not asked:
         return

@@ -70,7 +70,9 @@ class Classes:
             if line.to is not None:
                 for text, number in product(texts_of(line), numbers_of(line.to.term)):
                     self.of_text(text, number)
-        performs = any(activity.name == "perform" for activity in every(Activity, checked.frames))
+        performs = bool(checked.seated) or any(
+            activity.name == "perform" for activity in every(Activity, checked.frames)
+        )
         self.of_performed = [
             self._number(self._of_pair(k, nouns) | self._of_text(text))
             for k, text in enumerate(checked.sentences.by_number())

@@ -14,7 +14,16 @@ from socialai_dsl.compiler.activities import (
     Activities,
     has_aim,
 )
-from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, state_names
+from socialai_dsl.compiler.assembler import (
+    Block,
+    CodeTable,
+    Label,
+    Registers,
+    Sites,
+    label,
+    seat_path,
+    state_names,
+)
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
     DeferredRules,
@@ -40,7 +49,7 @@ from socialai_dsl.compiler.step_order import (
     way_after,
 )
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.program import Body, Header, Op, constant
+from socialai_dsl.program import Body, Header, Op, SeatRegister, constant
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import (
     FOR_EVER,
@@ -51,8 +60,9 @@ from socialai_dsl.semantics.plans import (
     RulePlan,
     StepPlan,
 )
-from socialai_dsl.semantics.terms import BOOL, Pattern, Type
+from socialai_dsl.semantics.terms import ACTION, BOOL, Pattern, Read, Type
 from socialai_dsl.semantics.words import ACTIVITIES
+from socialai_dsl.widths import LARGEST_NUMBER
 
 
 class RuleConditions:
@@ -137,13 +147,33 @@ def allocate(checked: CheckedScenario, notes: NoteTaker, numbered: Lines | None)
     if numbered is not None:
         lines.adopt(numbered)
     note_what_is_said(checked, lines, registers)
+    seat_registers(checked, registers)
     homes = Homes(checked, registers)
     # A member hears each of the others at most once between two of its turns.
-    inbox_size, entry_size = 1 + len(checked.frames), 3 if classes.speakers_matter else 1
+    # Of a member with a seat perhaps twice: when it has spoken in its turn, and a player sits down and speaks.
+    inbox_size = 1 + len(checked.frames) + 2 * len(checked.seated)
+    entry_size = 3 if classes.speakers_matter else 1
     inbox = registers.reserve(0)
     inbox_of = {frame.member: registers.reserve(1 + entry_size * inbox_size) for frame in checked.frames}
     computed = ComputedStatuses(checked)
     return Allocation(checked, notes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size)
+
+
+def seat_registers(checked: CheckedScenario, registers: Registers) -> None:
+    """Allocate the registers of the seats but the agent's, `MEMBER.seat.NAME`, in the order of `SeatRegister`."""
+    ranges = {
+        SeatRegister.TAKEN: BOOL,
+        SeatRegister.ACTION: ACTION,
+        SeatRegister.UTTERANCE: Type("int", 0, len(checked.sentences.by_number())),
+        SeatRegister.SHARE: Type("int", 0, 100),
+        SeatRegister.BONUS: Type("int", -LARGEST_NUMBER, LARGEST_NUMBER),
+    }
+    for number in checked.seated:
+        for which in SeatRegister:
+            if which in ranges:
+                registers.add(seat_path(checked.entities[number], which), ranges[which], fleeting=True)
+            elif which != SeatRegister.COUNT:
+                registers.reserve(1)
 
 
 # -- frames: for each state and each class of utterance heard, only the rules that can then fire -------------
@@ -230,7 +260,7 @@ class _FrameCompiler:
             if nested.rounds > 1
         }
         self.speaker = shared.checked.entities[frame.entity]
-        self._is_agents = frame.entity == AGENT
+        self._is_agents = frame.entity == AGENT or frame.entity in shared.checked.seated
         self.later = DeferredRules(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: plans.Activity) -> Type:
@@ -675,17 +705,40 @@ def _first_that_holds(to: Expressions, checked: CheckedScenario, notes: NoteTake
         following = Label()
         asked = notes.outcome(to, number, outcome)
         asked.condition(to, "outcome", outcome.condition, following)
-        if outcome.graded is not None and outcome.success:
-            with block.scratch():
+        with block.scratch():
+            if outcome.success and (outcome.graded or any(graded for _, graded in outcome.shares)):
                 to.failed = asked.nothing("values", following)
+            _pay_seats(to, checked, outcome)
+            if outcome.graded is not None and outcome.success:
                 block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
-                to.failed = None
-        else:
-            block.emit(Op.END, number, outcome.percent if outcome.success else 0)
+            else:
+                block.emit(Op.END, number, outcome.percent if outcome.success else 0)
+            to.failed = None
         block.halt()
         asked.report(to, following)
         block.bind(following)
     block.halt()
+
+
+def _pay_seats(to: Expressions, checked: CheckedScenario, outcome: OutcomePlan) -> None:
+    """Emit the shares of the seats other than the agent's."""
+    for number, (percent, graded) in zip(checked.seated, outcome.shares, strict=False):
+        register = to.registers.by_path[seat_path(checked.entities[number], SeatRegister.SHARE)]
+        share = constant(percent if outcome.success else 0)
+        if graded is not None and outcome.success:
+            least = to.into_temporary(Op.MAX, to.sited_value(graded), constant(0))
+            share = to.into_temporary(Op.MIN, least, constant(100))
+        to.block.emit(Op.LOAD, register, share)
+
+
+def seat_code(allocation: Allocation, number: int) -> int:
+    """The address of the code by which a member says what the player on its seat says."""
+    to = allocation.expressions()
+    speaker = allocation.checked.entities[number]
+    said = Read(Type("int", 0, len(allocation.lines.grammar)), seat_path(speaker, SeatRegister.UTTERANCE))
+    allocation.lines.perform(to, speaker, said)
+    to.block.halt()
+    return allocation.code.add(to.block, f"{label(speaker)}.seat")
 
 
 # -- the whole scenario --------------------------------------------------------------------------------------
@@ -697,11 +750,13 @@ class LoweredCode:
 
     Attributes:
         entries: header word -> address. frames: of each frame instance. outcomes: addresses by (class, action).
+        seats: of what says what a player says, for each seat but the agent's.
     """
 
     entries: dict[Header, int]
     frames: list[FrameCode]
     outcomes: list[int]
+    seats: list[int]
 
 
 def lower(allocation: Allocation) -> LoweredCode:
@@ -725,5 +780,6 @@ def lower(allocation: Allocation) -> LoweredCode:
         Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(allocation)
+    seats = [seat_code(allocation, number) for number in allocation.checked.seated]
     notes.declare(allocation.registers)
-    return LoweredCode(entries, frames, outcomes)
+    return LoweredCode(entries, frames, outcomes, seats)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.compiler.assembler import state_names
+from socialai_dsl.compiler.assembler import said_path, seat_path, state_names
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.instruction_checks import (
     PathFacts,
@@ -31,6 +31,7 @@ from socialai_dsl.program import (
     NO_GESTURE,
     SECRET,
     TESTS,
+    Body,
     EntityColumn,
     EntityName,
     Field,
@@ -42,6 +43,8 @@ from socialai_dsl.program import (
     Outcome,
     Program,
     Register,
+    SeatColumn,
+    SeatRegister,
     TypeColumn,
     pack_cell,
 )
@@ -50,8 +53,8 @@ from socialai_dsl.program.program import bounds_of
 from socialai_dsl.semantics.free_cells import interior_cells
 from socialai_dsl.semantics.plans import CheckedScenario, Entity, LookPlan, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
-from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
-from socialai_dsl.widths import MOST_WORDS, WHOLE_REGISTER
+from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL, normal
+from socialai_dsl.widths import MOST_SEATS, MOST_WORDS, WHOLE_REGISTER
 
 
 def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
@@ -67,6 +70,10 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
     heard = registers.reserve(heard_size)
     log_size = length // min((len(tokens) for tokens in lines.tokens), default=length)
     log = registers.reserve(log_size)
+    seats = [
+        _seat_row(allocation, number, says, registers.reserve(heard_size), registers.reserve(log_size))
+        for number, says in zip(checked.seated, lowered.seats, strict=True)
+    ]
 
     header = dict.fromkeys(Header, 0)
     body: list[int] = []
@@ -76,6 +83,8 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         body.extend(words)
 
     types = _TypeTable(checked)
+    if seats:
+        body += [len(seats), *(word for row in seats for word in row), *_pairs_said(allocation)]
     table(Header.CODE_AT, [word for row in code.instructions for word in row])
     table(Header.ACTION_AT, [*(ACTIONS.index(action) for action in checked.actions), len(ACTIONS) - 1])
     table(Header.CLASS_AT, classes.of_pair)
@@ -146,7 +155,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         lines=tuple(lines.texts),
         line_speakers=_speakers_of(lines),
         outcome_table=(
-            *(Outcome(o.name, o.success, o.condition.span) for o in checked.outcomes),
+            *(Outcome(o.name, o.success, o.condition.span, o.seats) for o in checked.outcomes),
             Outcome("deadly", False),
             Outcome("timeout", False),
         ),
@@ -194,8 +203,30 @@ def _flags(allocation: Allocation) -> int:
         Flag.SETTLE_ALWAYS: allocation.computed.settle_always,
         Flag.SHOWS_CARRYING: checked.shows_carrying,
         Flag.CARRYING: any(entity.carryable for entity in checked.entities),
+        Flag.SEATS: bool(checked.seated),
     }
     return sum(flag for flag, on in flags.items() if on)
+
+
+def _seat_row(allocation: Allocation, number: int, says: int, heard: int, log: int) -> list[int]:
+    """One row of the seat table, of the seat of a member of the cast."""
+    member, by_path = allocation.checked.entities[number], allocation.registers.by_path
+    row = {
+        SeatColumn.ENTITY: number,
+        SeatColumn.FIRST: by_path[seat_path(member, SeatRegister.TAKEN)],
+        SeatColumn.HEARD: heard,
+        SeatColumn.LOG: log,
+        SeatColumn.SAYS: says,
+        SeatColumn.SAID: by_path.get(said_path(member), 0),
+    }
+    return _in_columns(SeatColumn, row)
+
+
+def _pairs_said(allocation: Allocation) -> list[int]:
+    """For each line 1 + the pair of the grammar that says the same, 0 if there is none."""
+    lines = allocation.lines
+    pairs = {normal(text): 1 + k for k, text in reversed([*enumerate(lines.grammar)])}
+    return [pairs.get(normal(text), 0) for text in lines.said]
 
 
 def _frame_rows(allocation: Allocation, frames: list[FrameCode]) -> list[int]:
@@ -426,6 +457,7 @@ class _Code:
             yield self.program.header(word), word
         for table in (Header.STATE_AT, Header.OUTCOME_AT):
             yield from ((pc, table) for pc in self.program.table(table).ravel().tolist())
+        yield from ((pc, Header.LINE_AT) for pc in self.program.seat_table[:, SeatColumn.SAYS].tolist())
         of_frames = self.program.table(Header.FRAME_AT)[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]]
         yield from ((pc, Header.FRAME_AT) for pc in of_frames.ravel().tolist())
 
@@ -519,6 +551,7 @@ def verify(program: Program) -> None:
     _frames(program)
     _lines(program)
     _inside(program, Header.ACTION_AT, program.header(Header.PRIMITIVES) + 1, 0, 7)
+    _seats(program)
     pairs = program.header(Header.TEMPLATES) * program.header(Header.NOUNS)
     _inside(program, Header.CLASS_AT, pairs, 1, program.header(Header.CLASSES) - 1)
     _Code(program).check()
@@ -576,6 +609,14 @@ def _registers(program: Program) -> None:
             (h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * inbox_registers(program), "inboxes"),
             (h(Header.HEARD), h(Header.HEARD) + h(Header.HEARD_SIZE), "lines heard"),
             (h(Header.LOG), h(Header.LOG) + h(Header.LOG_SIZE), "log"),
+            *(
+                (row[column], row[column] + h(size), f"{name} of seat {seat}")
+                for seat, row in enumerate(program.seat_table.tolist(), 1)
+                for column, size, name in (
+                    (SeatColumn.HEARD, Header.HEARD_SIZE, "lines heard"),
+                    (SeatColumn.LOG, Header.LOG_SIZE, "log"),
+                )
+            ),
         ]
     )
     for (_, end, name), (start, _, following) in pairwise(areas):
@@ -667,6 +708,45 @@ def _frames(program: Program) -> None:
         _require(clock is not None, f"frame {number} has no clock")
         inbox = h(Header.INBOX) + number * inbox_registers(program)
         _require(row[FrameColumn.INBOX] == inbox, f"frame {number} has no inbox of its own")
+
+
+def _seats(program: Program) -> None:
+    """Every seat is that of a member of its own, with registers that hold what the engine writes there."""
+    h = program.header
+    if not h(Header.FLAGS) & Flag.SEATS:
+        return
+    table, pairs = program.seat_table, h(Header.TEMPLATES) * h(Header.NOUNS)
+    start = Header.END + 1 + table.size
+    _require(0 < len(table) < MOST_SEATS, f"{len(table)} seats besides the agent's")
+    _require(start + h(Header.LINES) <= h(Header.CODE_AT), "the seat table reaches into the code")
+    said = program.pairs_said
+    _require(bool(((said >= 0) & (said <= pairs)).all()), "a line says what the grammar cannot")
+    members = table[:, SeatColumn.ENTITY].tolist()
+    _require(
+        members == sorted(set(members)) and members[0] > 0 and members[-1] <= h(Header.NPCS),
+        f"seats of {members}",
+    )
+    _require(0 < h(Header.AGENT_SAYS) <= h(Header.LINES) + 1 - pairs, "what the agent says is no line")
+    ranges = {name.register: (name.low, name.high) for name in program.registers}
+    wanted = {
+        SeatRegister.TAKEN: (0, 1),
+        SeatRegister.ACTION: (0, int(Body.NONE)),
+        SeatRegister.SHARE: (0, 100),
+    }
+    wanted[SeatRegister.UTTERANCE] = (0, pairs)
+    for row in table.tolist():
+        first = row[SeatColumn.FIRST]
+        _require(first > 0 and first + SeatRegister.COUNT <= h(Header.REGISTERS), "a seat without registers")
+        for which, interval in wanted.items():
+            fits = ranges.get(first + which) == interval
+            _require(fits, f"register {first + which} does not hold the {which.name} of a seat")
+        free = {*range(first, first + SeatRegister.COUNT)} - {
+            first + which for which in (*wanted, SeatRegister.BONUS)
+        }
+        _require(free.isdisjoint(ranges), "a named register lies in a seat")
+        _require(
+            row[SeatColumn.SAID] == 0 or row[SeatColumn.SAID] in ranges, "a seat notes what it says nowhere"
+        )
 
 
 def _lines(program: Program) -> None:

@@ -28,7 +28,18 @@ from socialai_dsl.engine.state import (
     no_pins,
 )
 from socialai_dsl.engine.views import view_table
-from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, Op, Program, TypeColumn
+from socialai_dsl.program import (
+    VIEW,
+    EntityColumn,
+    Flag,
+    FrameColumn,
+    Header,
+    Op,
+    Outcome,
+    Program,
+    TypeColumn,
+)
+from socialai_dsl.widths import MOST_SEATS
 
 _PLAIN_CHANNELS: Final = 4
 _TWO_GESTURES: Final = 2
@@ -79,6 +90,7 @@ class Batch:
         pool_of_row: Sequence[int],
         length: int,
         sequences: Collection[int] = (),
+        seats: int = 1,
     ) -> None:
         """Allocate everything; every row must be reset before its first step.
 
@@ -89,13 +101,15 @@ class Batch:
             length: tokens in a history.
             sequences: numbers of the pools whose programs are the acts of one episode, played one after another. They
                 have one horizon.
+            seats: how many seats callers play: the agent's alone, or all that every program has.
         """
         _check_sequences(parts, [pools[number] for number in sequences])
         rows = self._rows = len(pool_of_row)
         programs = [part.program for part in parts]
         registers = max(program.header(Header.REGISTERS) for program in programs)
         board = max(_board_words(program) for program in programs)
-        words, views, self.offsets, self.first_counters = _link(parts)
+        self.seats = seats
+        words, views, self.offsets, self.first_counters = _link(parts, length, seats)
         starts = np.cumsum([0, *map(len, pools)])
         self.tables = Tables(
             words,
@@ -104,7 +118,7 @@ class Batch:
             np.concatenate([np.arange(1, len(pool) + 1) for pool in pools]).astype(np.int64),
         )
         self.more = _more(parts)
-        self.state: State = empty_state(rows, registers, board, length, VIEW, self.more)
+        self.state: State = empty_state(rows, registers, board, length, VIEW, self.more, seats)
         counters = sum(program.header(Header.COUNTERS) for program in programs)
         self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots), self.more)
         self.counters = self.ports.counters
@@ -159,7 +173,7 @@ class Batch:
 
         Args:
             task: one of the steps.
-            actions: integers (E, 3 + slots); left out, `ports.actions`.
+            actions: integers (E S, 3 + slots); left out, `ports.actions`.
 
         Raises:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
@@ -193,8 +207,8 @@ class Batch:
         load(script)(self._book, self._rows)
 
     def identify(self) -> NDArray[np.int64]:
-        """A digest of each picture, int64 (E,)."""
-        load(identify)(self._book, self._rows)
+        """A digest of each picture, int64 (E S,)."""
+        load(identify)(self._book, self._rows * self.seats)
         return self.ports.image_ids.view(np.int64).copy()
 
     def _serve(self, task: Task) -> int:
@@ -236,7 +250,7 @@ def _check_sequences(parts: Sequence[LinkedProgram], sequences: Sequence[Sequenc
 
 
 def _link(
-    parts: Sequence[LinkedProgram],
+    parts: Sequence[LinkedProgram], length: int, seats: int
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
     shown, more = _shown(parts), _more(parts)
@@ -264,12 +278,13 @@ def _link(
             (Link.SIZE_AT, [*map(len, part.slots)]),
             (Link.WORD_AT, [*chain(*part.slots)]),
             (Link.ENDING_AT, part.outcomes),
-            (Link.SUCCESS_AT, [outcome.success for outcome in program.outcome_table]),
+            (Link.SUCCESS_AT, [_successful(outcome) for outcome in program.outcome_table]),
             (Link.LOOK_AT, part.looks),
         ):
             link[place] = h(Header.SIZE) + len(link) + len(tables)
             tables += table
         link[Link.MORE], link[Link.LOOKS] = more, len(part.looks)
+        link[Link.SEATS], link[Link.TOKENS] = seats, length
         link[Link.LOOK_REGISTER_AT] = h(Header.SIZE) - h(Header.ENTITIES) * len(part.looks)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(program)
         own = _with_tokens(part)
@@ -280,6 +295,13 @@ def _link(
         offset += len(own) + len(link) + len(tables)
         counter += h(Header.COUNTERS)
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
+
+
+def _successful(outcome: Outcome) -> int:
+    """The seats that an outcome is a success of, as bits."""
+    if not outcome.success:
+        return 0
+    return sum(1 << seat for seat in (range(MOST_SEATS) if outcome.seats is None else outcome.seats))
 
 
 def _shown(parts: Sequence[LinkedProgram]) -> int:

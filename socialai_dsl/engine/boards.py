@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from socialai_dsl.engine.entities import column, field, is_at, is_present
+from socialai_dsl.engine.entities import column, field, is_at, is_present, object_at
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.state import ZERO, Row
 from socialai_dsl.program import (
@@ -111,6 +111,19 @@ def type_row(row: Row, entity: int) -> int:
     """Offset of the entity's row in the type table, by its status."""
     line = column(row, entity, EntityColumn.TYPE) + field(row, entity, Field.STATUS)
     return row.program[Header.TYPE_AT] + TypeColumn.COLUMNS * line
+
+
+@inline
+def is_deadly_under(row: Row, x: int, y: int) -> bool:
+    """Whether the thing in this cell is deadly, whoever stands on it and is drawn over it."""
+    mask = row.program[Header.DEADLY]
+    if mask == 0:
+        return False
+    code = row.program[room_table(row) + y * row.program[Header.CANVAS_WIDTH] + x] & 0xFF
+    top = object_at(row, x, y)
+    if top > 0:
+        code = row.program[type_row(row, top) + TypeColumn.CODE]
+    return code < 32 and (mask >> code) & 1 == 1
 
 
 @inline

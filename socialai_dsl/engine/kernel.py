@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.calls import BAD_ACTION, NO_ROOM, TERMINATED, Task
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.picture import take_picture
+from socialai_dsl.engine.picture import take_pictures
 from socialai_dsl.engine.pointers import (
     bare,
     bytes_of,
@@ -24,7 +24,7 @@ from socialai_dsl.engine.pointers import (
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.state import ZERO, ArrayId, Key, Link, Row, Size
-from socialai_dsl.engine.step import step_row
+from socialai_dsl.engine.step import pay_seats, step_row
 from socialai_dsl.engine.views import CELLS
 from socialai_dsl.program import Header, Register
 from socialai_dsl.widths import UNPINNED
@@ -33,11 +33,13 @@ from socialai_dsl.widths import UNPINNED
 @outline
 def _keep_final(book: Any, row: int) -> None:
     stay_outline()
-    length = int64_of(book, ArrayId.SIZES, ZERO)[Size.TOKENS]
-    copy(uint32_of(book, ArrayId.FINAL_IMAGE, row), uint32_of(book, ArrayId.IMAGE, row), np.int64(CELLS))
-    copy(tokens_of(book, ArrayId.FINAL_TOKENS, row), tokens_of(book, ArrayId.TOKENS, row), length)
-    gestures = int64_of(book, ArrayId.SIZES, ZERO)[Size.EXTRA]
-    copy(uint16_of(book, ArrayId.FINAL_EXTRA, row), uint16_of(book, ArrayId.EXTRA, row), gestures)
+    sizes = int64_of(book, ArrayId.SIZES, ZERO)
+    copy(tokens_of(book, ArrayId.FINAL_TOKENS, row), tokens_of(book, ArrayId.TOKENS, row), sizes[Size.TOKENS])
+    for player in range(row * sizes[Size.SEATS], (row + 1) * sizes[Size.SEATS]):
+        cells = uint32_of(book, ArrayId.IMAGE, player)
+        copy(uint32_of(book, ArrayId.FINAL_IMAGE, player), cells, np.int64(CELLS))
+        extra = uint16_of(book, ArrayId.EXTRA, player)
+        copy(uint16_of(book, ArrayId.FINAL_EXTRA, player), extra, sizes[Size.EXTRA])
 
 
 @inline
@@ -53,10 +55,10 @@ def _plays_acts(key: NDArray[np.uint64]) -> bool:
 
 
 @inline
-def _is_success(row: Row) -> bool:
-    """Whether the program ended with a success."""
+def _is_success(row: Row, seat: int) -> bool:
+    """Whether the program ended with a success of a seat."""
     table = row.program[row.program[Header.SIZE] + Link.SUCCESS_AT]
-    return row.program[table + row.registers[Register.OUTCOME]] != 0
+    return (row.program[table + row.registers[Register.OUTCOME]] >> seat) & 1 != 0
 
 
 @outline
@@ -71,7 +73,7 @@ def _open_act(book: Any, opened: Row) -> int:
     t = opened.registers[Register.T]
     if opened.registers[Register.ENDED] != TERMINATED or not 0 < act < _pool_size(key):
         return ZERO
-    if not _is_success(opened) or t >= opened.program[Header.HORIZON]:
+    if not _is_success(opened, ZERO) or t >= opened.program[Header.HORIZON]:
         key[Key.SPOILED] = np.uint64(1)
     if t >= opened.program[Header.HORIZON]:
         return ZERO
@@ -105,23 +107,25 @@ def _open_episode(book: Any, layout: int, row: int) -> None:
 
 
 @inline
-def _report_nothing(book: Any, row: int) -> None:
-    float64_of(book, ArrayId.REWARD, ZERO)[row] = 0.0
+def _report_nothing(book: Any, row: int, seats: int) -> None:
     registers_of(book, ArrayId.OUTCOME, ZERO)[row] = -1
     bytes_of(book, ArrayId.TERMINATED, ZERO)[row] = 0
     bytes_of(book, ArrayId.TRUNCATED, ZERO)[row] = 0
-    bytes_of(book, ArrayId.SUCCESS, ZERO)[row] = 0
+    for player in range(row * seats, (row + 1) * seats):
+        float64_of(book, ArrayId.REWARD, ZERO)[player] = 0.0
+        bytes_of(book, ArrayId.SUCCESS, ZERO)[player] = 0
     bytes_of(book, ArrayId.ENDED, ZERO)[row] = 0
 
 
 @inline
-def _report_end(book: Any, row: int, opened: Row) -> None:
+def _report_end(book: Any, row: int, opened: Row, seats: int) -> None:
     table = opened.program[opened.program[Header.SIZE] + Link.ENDING_AT]
     registers_of(book, ArrayId.OUTCOME, ZERO)[row] = opened.program[
         table + opened.registers[Register.OUTCOME]
     ]
-    success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
-    bytes_of(book, ArrayId.SUCCESS, ZERO)[row] = np.int64(success)
+    for seat in range(seats):
+        success = _is_success(opened, seat) and opened.key[Key.SPOILED] == np.uint64(0)
+        bytes_of(book, ArrayId.SUCCESS, ZERO)[row * seats + seat] = np.int64(success)
     bytes_of(book, ArrayId.ENDED, ZERO)[row] = 1
     if opened.registers[Register.ENDED] == TERMINATED:
         bytes_of(book, ArrayId.TERMINATED, ZERO)[row] = 1
@@ -160,8 +164,9 @@ def serve(book: Any, task: int, rows: int) -> int:
         How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
     arrays = bare(book)
+    seats = int64_of(arrays, ArrayId.SIZES, ZERO)[Size.SEATS]
     ended = 0
-    if task != Task.RESET and not _actions_fit(arrays, rows):
+    if task != Task.RESET and not _actions_fit(arrays, rows * seats):
         return BAD_ACTION
     for row in range(rows):
         layout = ZERO
@@ -171,20 +176,22 @@ def serve(book: Any, task: int, rows: int) -> int:
                 continue
             layout = int32_of(arrays, ArrayId.LAYOUT, ZERO)[row]
         else:
-            _report_nothing(arrays, row)
+            _report_nothing(arrays, row, seats)
             if registers_of(arrays, ArrayId.REGISTERS, row)[Register.ENDED] == 0:
                 opened = open_row(arrays, ZERO, row)
-                reward = step_row(opened, opened.program[Header.SIZE], arrays, row)
+                reward = step_row(opened, opened.program[Header.SIZE], arrays, row * seats)
                 if reward != 0.0 and _plays_acts(opened.key):
                     reward /= np.float64(_pool_size(opened.key))
-                float64_of(arrays, ArrayId.REWARD, ZERO)[row] = reward
+                float64_of(arrays, ArrayId.REWARD, ZERO)[row * seats] = reward
+                if seats > 1:
+                    pay_seats(opened, arrays, row * seats)
                 if opened.registers[Register.ENDED] == 0:
                     continue
                 if _plays_acts(opened.key):
                     t = _open_act(arrays, opened)
                 if t == 0:
                     ended += 1
-                    _report_end(arrays, row, opened)
+                    _report_end(arrays, row, opened, seats)
                     if task != Task.STEP_SAME:
                         continue
                     _keep_final(arrays, row)
@@ -198,5 +205,5 @@ def serve(book: Any, task: int, rows: int) -> int:
         if not reset_row(fresh, layout != 0, t):
             bytes_of(arrays, ArrayId.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM
-        take_picture(fresh, fresh.program[Header.SIZE], arrays, row)
+        take_pictures(fresh, fresh.program[Header.SIZE], arrays, row * seats)
     return ended

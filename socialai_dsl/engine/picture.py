@@ -1,4 +1,4 @@
-"""The agent's picture: a gather of 49 cells through a table by pose."""
+"""The picture of each seat: a gather of 49 cells through a table by pose."""
 
 from typing import Any
 
@@ -6,15 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
-from socialai_dsl.engine.boards import object_look
+from socialai_dsl.engine.boards import npcs_are_hidden, object_look
 from socialai_dsl.engine.carrying import carried_by
-from socialai_dsl.engine.entities import field, is_present, npc_at, quadrant, step_x, step_y
+from socialai_dsl.engine.entities import column, field, is_at, is_present, npc_at, quadrant, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import bytes_of, uint16_of, uint32_of
+from socialai_dsl.engine.seats import seat_word, seats_played
 from socialai_dsl.engine.shadows import lit_cells
-from socialai_dsl.engine.state import AGENT, NOTHING, ArrayId, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, ONE, ArrayId, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
-from socialai_dsl.program import CELL, LAST_ACTS, NO_GESTURE, POINTING_HERE, VIEW, Body, Field, Flag, Header
+from socialai_dsl.program import (
+    CELL,
+    LAST_ACTS,
+    NO_GESTURE,
+    POINTING_HERE,
+    VIEW,
+    Body,
+    EntityColumn,
+    Field,
+    Flag,
+    Header,
+    SeatColumn,
+)
 from socialai_dsl.vocabulary import NPC
 
 _HALF = np.int64(VIEW // 2)
@@ -39,35 +52,56 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 
 
 @inline
-def take_picture(row: Row, link: int, book: Any, number: int) -> None:
-    """Write what the agent, in row `number` of the book, sees; its own cell shows what it carries, or reads empty."""
+def take_pictures(row: Row, link: int, book: Any, number: int) -> None:
+    """Write what the players of all seats see; the agent is in row `number` of the book, the others follow."""
+    _take_picture(row, link, book, number, AGENT)
+    if row.program[Header.FLAGS] & Flag.SEATS:
+        for seat in range(1, seats_played(row)):
+            _take_picture_of(row, link, book, number, seat)
+
+
+@outline
+def _take_picture_of(row: Row, link: int, book: Any, number: int, seat: int) -> None:
+    """Of a seat other than the agent's; its own cell tells which one it is."""
+    stay_outline()
+    _take_picture(row, link, book, number + seat, seat_word(row, seat, SeatColumn.ENTITY))
+    image = uint32_of(book, ArrayId.IMAGE, number + seat)
+    image[OWN_PLACE] = (image[OWN_PLACE] & 0xFFFFFF) | seat << 24
+    if row.program[row.program[Header.SIZE] + Link.MORE] > 0:
+        picture = bytes_of(book, ArrayId.PICTURE, number + seat)
+        picture[(4 + row.program[link + Link.MORE]) * OWN_PLACE + 3] = seat
+
+
+@inline
+def _take_picture(row: Row, link: int, book: Any, number: int, viewer: int) -> None:
+    """Write what a member of the cast sees into a row; its own cell shows what it carries, or reads empty."""
     flags = row.program[Header.FLAGS]
     image = uint32_of(book, ArrayId.IMAGE, number)
-    x = field(row, AGENT, Field.X)
-    y = field(row, AGENT, Field.Y)
-    if x < 0:
+    x = field(row, viewer, Field.X)
+    y = field(row, viewer, Field.Y)
+    if not is_present(row, viewer):
         for i in range(CELLS):
             image[i] = row.program[Header.OUTSIDE]
         image[OWN_PLACE] = OWN_LOOK
     else:
         lit = _EVERYWHERE
         if flags & Flag.OCCLUSION:
-            lit = lit_cells(row, x, y, field(row, AGENT, Field.DIR))
-        pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
+            lit = lit_cells(row, x, y, field(row, viewer, Field.DIR))
+        pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, viewer, Field.DIR)
         view = uint16_of(book, ArrayId.VIEWS, row.program[link + Link.VIEWS] + pose)
         _gather(row, view, lit, image)
+        if viewer != AGENT:
+            _show_agent(row, image, viewer)
     if flags & Flag.CARRYING:
-        carried = carried_by(row, AGENT)
+        carried = carried_by(row, viewer)
         if carried != 0:
             image[OWN_PLACE] = object_look(row, carried)
     if flags & Trait.MORE:
-        _show_more(
-            row, link, image, bytes_of(book, ArrayId.EXTRA, number), bytes_of(book, ArrayId.PICTURE, number)
-        )
+        extra = bytes_of(book, ArrayId.EXTRA, number)
+        _show_more(row, link, viewer, image, extra, bytes_of(book, ArrayId.PICTURE, number))
     elif flags & (Flag.EGOCENTRIC | Trait.GESTURES):
-        _show_npcs(
-            row, image, uint16_of(book, ArrayId.EXTRA, number), uint16_of(book, ArrayId.PICTURE, number)
-        )
+        words = uint16_of(book, ArrayId.EXTRA, number)
+        _show_npcs(row, viewer, image, words, uint16_of(book, ArrayId.PICTURE, number))
 
 
 @inline
@@ -82,11 +116,27 @@ def _gather(row: Row, view: NDArray[np.uint16], lit: np.uint64, image: NDArray[n
 
 
 @inline
-def _place_in_view(row: Row, npc: int) -> int:
-    """Where in the picture an NPC would be seen if nothing was in the way, -1 if it is out of view."""
-    direction = field(row, AGENT, Field.DIR)
-    dx = field(row, npc, Field.X) - field(row, AGENT, Field.X)
-    dy = field(row, npc, Field.Y) - field(row, AGENT, Field.Y)
+def _show_agent(row: Row, image: NDArray[np.uint32], viewer: int) -> None:
+    """Show the agent, which is not on the board, where another one sees it."""
+    place = _place_in_view(row, viewer, AGENT)
+    if place >= 0 and place != OWN_PLACE and image[place] != 0 and is_shown(row, AGENT):
+        kind = column(row, AGENT, EntityColumn.KIND)
+        color = field(row, AGENT, Field.COLOR)
+        image[place] = NPC | color << 8 | kind << 16 | field(row, AGENT, Field.DIR) << 24
+
+
+@inline
+def is_shown(row: Row, member: int) -> bool:
+    """Whether players see a member of the cast where it is lit."""
+    return is_present(row, member) and not npcs_are_hidden(row)
+
+
+@inline
+def _place_in_view(row: Row, viewer: int, thing: int) -> int:
+    """Where in the picture something would be seen if nothing was in the way, -1 if it is out of view."""
+    direction = field(row, viewer, Field.DIR)
+    dx = field(row, thing, Field.X) - field(row, viewer, Field.X)
+    dy = field(row, thing, Field.Y) - field(row, viewer, Field.Y)
     ahead = dx * step_x(direction) + dy * step_y(direction)
     right = dy * step_x(direction) - dx * step_y(direction)
     # One test instead of three: positions are as good as random, so each branch on them is often mispredicted.
@@ -97,9 +147,9 @@ def _place_in_view(row: Row, npc: int) -> int:
 
 @outline
 def _show_npcs(
-    row: Row, image: NDArray[np.uint32], extra: NDArray[np.uint16], picture: NDArray[np.uint16]
+    row: Row, viewer: int, image: NDArray[np.uint32], extra: NDArray[np.uint16], picture: NDArray[np.uint16]
 ) -> None:
-    """Show which way NPCs look relative to the agent, where they point and what they did last, as far as shown.
+    """Show which way NPCs look relative to the viewer, where they point and what they did last, as far as shown.
 
     Then all channels are in `picture`. Whether the picture shows an NPC, which may be in the dark, hidden, or behind
     another in its cell, is known late, so nothing branches on it.
@@ -110,10 +160,10 @@ def _show_npcs(
         for i in range(CELLS):
             extra[i] = NO_GESTURE << 8 | NO_GESTURE
         _put_together(image, picture)
-    own = field(row, AGENT, Field.DIR)
-    for npc in range(1, row.program[Header.NPCS] + 1):
-        place = _place_in_view(row, npc)
-        if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
+    own = field(row, viewer, Field.DIR)
+    for npc in range(_first_seen(viewer), row.program[Header.NPCS] + 1):
+        place = _place_in_view(row, viewer, npc)
+        if place < 0 or not _is_in_front(row, viewer, npc):
             continue
         look = image[place]
         shown = -np.int64(look & 0xFF == NPC)
@@ -131,9 +181,32 @@ def _show_npcs(
             picture[3 * place + 2] = gesture
 
 
+@inline
+def _first_seen(viewer: int) -> int:
+    """The first member of the cast that is shown as an NPC: nobody sees oneself."""
+    return ONE if viewer == AGENT else AGENT
+
+
+@inline
+def _is_in_front(row: Row, viewer: int, npc: int) -> bool:
+    """Whether a member is the first in its cell, the one that a viewer sees of several."""
+    x = field(row, npc, Field.X)
+    y = field(row, npc, Field.Y)
+    if viewer == AGENT:
+        return npc_at(row, x, y) == npc
+    if is_at(row, AGENT, x, y):
+        return npc == AGENT
+    return npc != viewer and npc_at(row, x, y) == npc
+
+
 @outline
 def _show_more(
-    row: Row, link: int, image: NDArray[np.uint32], extra: NDArray[np.uint8], picture: NDArray[np.uint8]
+    row: Row,
+    link: int,
+    viewer: int,
+    image: NDArray[np.uint32],
+    extra: NDArray[np.uint8],
+    picture: NDArray[np.uint8],
 ) -> None:
     """As `_show_npcs`, where pictures of the batch also show which cells NPCs point at, what they carry, or looks."""
     stay_outline()
@@ -142,11 +215,11 @@ def _show_more(
     more = row.program[link + Link.MORE]
     for i in range(more * CELLS):
         extra[i] = NO_GESTURE
-    _show_looks_of_objects(row, link, image, extra)
-    own = field(row, AGENT, Field.DIR)
-    for npc in range(1, row.program[Header.NPCS] + 1):
-        place = _place_in_view(row, npc)
-        if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
+    _show_looks_of_objects(row, link, viewer, image, extra)
+    own = field(row, viewer, Field.DIR)
+    for npc in range(_first_seen(viewer), row.program[Header.NPCS] + 1):
+        place = _place_in_view(row, viewer, npc)
+        if place < 0 or not _is_in_front(row, viewer, npc):
             continue
         look = image[place]
         if look & 0xFF != NPC:
@@ -189,13 +262,15 @@ def _join(image: NDArray[np.uint32], extra: NDArray[np.uint8], picture: NDArray[
 
 
 @inline
-def _show_looks_of_objects(row: Row, link: int, image: NDArray[np.uint32], extra: NDArray[np.uint8]) -> None:
+def _show_looks_of_objects(
+    row: Row, link: int, viewer: int, image: NDArray[np.uint32], extra: NDArray[np.uint8]
+) -> None:
     """Show the looks of objects that the picture shows: of several in a cell the last, which lies on top."""
-    if row.program[link + Link.LOOKS] == 0 or field(row, AGENT, Field.X) < 0:
+    if row.program[link + Link.LOOKS] == 0 or not is_present(row, viewer):
         return
-    carried = carried_by(row, AGENT)
+    carried = carried_by(row, viewer)
     for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
-        place = _place_in_view(row, entity)
+        place = _place_in_view(row, viewer, entity)
         if entity == carried:
             _show_looks(row, link, extra, OWN_PLACE, entity)
         elif (

@@ -125,7 +125,7 @@ def _script_row(book: Any, row: int) -> None:
     copy(registers, opened.registers, sizes[Size.REGISTERS])
     copy(board, opened.board, sizes[Size.BOARD])
     copy(counters, opened.counters, count)
-    _play(opened, opened.program[Header.SIZE], int64_of(book, ArrayId.ACTIONS, row))
+    _play(opened, opened.program[Header.SIZE], int64_of(book, ArrayId.ACTIONS, row * sizes[Size.SEATS]))
     copy(opened.registers, registers, sizes[Size.REGISTERS])
     copy(opened.board, board, sizes[Size.BOARD])
     copy(opened.counters, counters, count)

@@ -9,12 +9,22 @@ from socialai_dsl.engine.boards import draw_all
 from socialai_dsl.engine.entities import column, field, set_field
 from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.places import occupy
+from socialai_dsl.engine.seats import seat_register, seats_played
 from socialai_dsl.engine.sets import clear
 from socialai_dsl.engine.speech import clear_tokens, remember
 from socialai_dsl.engine.state import ATTEMPTS, OCCUPIED, ONE, RESETTING, ZERO, Key, Row
 from socialai_dsl.engine.turns import settle
 from socialai_dsl.engine.vm import run
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Body, EntityColumn, Field, Header, Register
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    Body,
+    EntityColumn,
+    Field,
+    Header,
+    Register,
+    SeatRegister,
+)
 from socialai_dsl.widths import UNPINNED
 
 MEMBER_SITE = np.int64(draws.site("member"))
@@ -80,7 +90,6 @@ def _draw_room(row: Row, pinned: bool, t: int) -> None:
 def _blank(row: Row) -> None:
     registers = row.registers
     clear_tokens(row)
-    row.key[Key.DIGEST] = np.uint64(0)
     for i in range(row.program[Header.REGISTERS]):
         registers[i] = 0
     for entity in range(row.program[Header.ENTITIES]):
@@ -97,6 +106,8 @@ def _blank(row: Row) -> None:
     registers[Register.ACTION] = Body.NONE
     registers[Register.LAST_TURN] = Body.NONE
     registers[Register.ENDED] = RESETTING
+    for seat in range(1, seats_played(row)):
+        registers[seat_register(row, seat, np.int64(SeatRegister.WISH))] = Body.NONE
     clear(row, OCCUPIED)
 
 

@@ -1,11 +1,27 @@
-"""Speech within earshot: the agent's log and tokens, the inboxes of NPCs."""
+"""Speech within earshot: the logs and tokens of the seats, the inboxes of NPCs."""
+
+from typing import NamedTuple
+
+import numpy as np
 
 from socialai_dsl.engine.boards import npcs_are_hidden
 from socialai_dsl.engine.entities import column, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.rng import fold
-from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
-from socialai_dsl.program import SECRET, EntityColumn, Field, Flag, FrameColumn, Header, LineColumn, Register
+from socialai_dsl.engine.seats import seat_register, seat_word, seats_played
+from socialai_dsl.engine.state import AGENT, NOTHING, ZERO, Key, Link, Row
+from socialai_dsl.program import (
+    SECRET,
+    EntityColumn,
+    Field,
+    Flag,
+    FrameColumn,
+    Header,
+    LineColumn,
+    Register,
+    SeatColumn,
+    SeatRegister,
+)
 
 
 @inline
@@ -13,72 +29,138 @@ def _line(row: Row, line: int, name: int) -> int:
     return row.program[row.program[Header.LINE_AT] + LineColumn.COLUMNS * line + name]
 
 
+class Ears(NamedTuple):
+    """Where a seat keeps what it hears: numbers of registers, its first token, and its digest in the row's key."""
+
+    heard: int
+    first_heard: int
+    logged: int
+    tokens: int
+    oldest: int
+    log: int
+    start: int
+    digest: int
+
+
 @inline
-def _forget_oldest(row: Row, words: int) -> None:
+def _ears_of_agent(row: Row) -> Ears:
+    return Ears(
+        np.int64(Register.HEARD),
+        row.program[Header.HEARD],
+        np.int64(Register.LOGGED),
+        np.int64(Register.TOKENS),
+        np.int64(Register.OLDEST),
+        row.program[Header.LOG],
+        ZERO,
+        np.int64(Key.DIGEST),
+    )
+
+
+@inline
+def _ears_of(row: Row, seat: int) -> Ears:
+    """Of a seat from 1 on."""
+    return Ears(
+        seat_register(row, seat, SeatRegister.HEARD),
+        seat_word(row, seat, SeatColumn.HEARD),
+        seat_register(row, seat, SeatRegister.LOGGED),
+        seat_register(row, seat, SeatRegister.TOKENS),
+        seat_register(row, seat, SeatRegister.OLDEST),
+        seat_word(row, seat, SeatColumn.LOG),
+        seat * row.program[row.program[Header.SIZE] + Link.TOKENS],
+        np.int64(Key.WORDS) - 1 + seat,
+    )
+
+
+@inline
+def _forget_oldest(row: Row, ears: Ears, words: int) -> None:
     """Drop whole lines, the oldest first, until the log has room for one more line and the tokens for `words` more.
 
     What lies behind the tokens that are left is not cleared.
     """
     registers = row.registers
-    log = row.program[Header.LOG]
-    lines = registers[Register.LOGGED]
+    lines = registers[ears.logged]
     most = row.program[Header.TOKENS] - words
-    left = registers[Register.TOKENS]
+    left = registers[ears.tokens]
     size = row.program[Header.LOG_SIZE]
     if left <= most and lines < size:
         return
-    oldest = registers[Register.OLDEST]
+    oldest = registers[ears.oldest]
     while lines > 0 and (left > most or lines >= size):
-        left -= _line(row, registers[log + oldest], LineColumn.TOKENS)
+        left -= _line(row, registers[ears.log + oldest], LineColumn.TOKENS)
         oldest = oldest + 1 if oldest + 1 < size else 0
         lines -= 1
     left = max(left, 0)
-    shift = registers[Register.TOKENS] - left
+    shift = registers[ears.tokens] - left
     for i in range(left):
-        row.tokens[i] = row.tokens[shift + i]
-    registers[Register.OLDEST] = oldest
-    registers[Register.LOGGED] = lines
-    registers[Register.TOKENS] = left
+        row.tokens[ears.start + i] = row.tokens[ears.start + shift + i]
+    registers[ears.oldest] = oldest
+    registers[ears.logged] = lines
+    registers[ears.tokens] = left
+
+
+@inline
+def _remember(row: Row, ears: Ears, line: int) -> None:
+    """Add a line to the log, the tokens and the digest; the oldest whole lines make room."""
+    registers = row.registers
+    words = _line(row, line, LineColumn.TOKENS)
+    before = registers[ears.tokens]
+    _forget_oldest(row, ears, words)
+    start = registers[ears.tokens]
+    first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
+    words = min(words, row.program[Header.TOKENS] - start)
+    for i in range(words):
+        row.tokens[ears.start + start + i] = row.program[first + i]
+    for i in range(start + words, before):
+        row.tokens[ears.start + i] = 0
+    place = registers[ears.oldest] + registers[ears.logged]
+    size = row.program[Header.LOG_SIZE]
+    registers[ears.log + (place if place < size else place - size)] = line
+    registers[ears.logged] += 1
+    registers[ears.tokens] = start + words
+    row.key[ears.digest] = fold(row.key[ears.digest], line)
+
+
+@inline
+def _take_in(row: Row, ears: Ears, line: int) -> None:
+    """Hear a line."""
+    heard = row.registers[ears.heard]
+    if heard < row.program[Header.HEARD_SIZE]:
+        row.registers[ears.first_heard + heard] = line
+        row.registers[ears.heard] = heard + 1
+    _remember(row, ears, line)
 
 
 @inline
 def remember(row: Row, line: int) -> None:
-    """Add a line to the log, the tokens and the digest; the oldest whole lines make room."""
-    registers = row.registers
-    words = _line(row, line, LineColumn.TOKENS)
-    before = registers[Register.TOKENS]
-    _forget_oldest(row, words)
-    start = registers[Register.TOKENS]
-    first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
-    words = min(words, row.program[Header.TOKENS] - start)
-    for i in range(words):
-        row.tokens[start + i] = row.program[first + i]
-    for i in range(start + words, before):
-        row.tokens[i] = 0
-    place = registers[Register.OLDEST] + registers[Register.LOGGED]
-    size = row.program[Header.LOG_SIZE]
-    registers[row.program[Header.LOG] + (place if place < size else place - size)] = line
-    registers[Register.LOGGED] += 1
-    registers[Register.TOKENS] = start + words
-    row.key[Key.DIGEST] = fold(row.key[Key.DIGEST], line)
+    """The agent has heard a line before."""
+    _remember(row, _ears_of_agent(row), line)
 
 
 @inline
 def hear(row: Row, line: int) -> None:
     """The agent hears a line."""
-    heard = row.registers[Register.HEARD]
-    if heard < row.program[Header.HEARD_SIZE]:
-        row.registers[row.program[Header.HEARD] + heard] = line
-        row.registers[Register.HEARD] = heard + 1
-    remember(row, line)
+    _take_in(row, _ears_of_agent(row), line)
+
+
+@outline
+def hear_on_seat(row: Row, seat: int, line: int) -> None:
+    """The player of another seat hears a line."""
+    stay_outline()
+    _take_in(row, _ears_of(row, seat), line)
 
 
 @inline
 def clear_tokens(row: Row) -> None:
-    """Empty the token buffer."""
+    """Empty the token buffers, and with them the digests."""
     for i in range(row.registers[Register.TOKENS]):
         row.tokens[i] = 0
     row.registers[Register.TOKENS] = 0
+    row.key[Key.DIGEST] = np.uint64(0)
+    for seat in range(1, seats_played(row)):
+        length = row.program[row.program[Header.SIZE] + Link.TOKENS]
+        for i in range(length):
+            row.tokens[seat * length + i] = 0
+        row.key[Key.WORDS - 1 + seat] = np.uint64(0)
 
 
 @inline
@@ -169,8 +251,8 @@ def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
 
 
 @inline
-def _agent_may_hear(row: Row, speaker: int) -> bool:
-    """Whether the agent hears an NPC at all: not while NPCs are hidden, unless the NPC is always audible."""
+def _may_hear(row: Row, speaker: int) -> bool:
+    """Whether a player hears a member at all: not while NPCs are hidden, unless that one is always audible."""
     return not npcs_are_hidden(row) or column(row, speaker, EntityColumn.MANNERS) & 1 != 0
 
 
@@ -191,20 +273,34 @@ def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
             and entity not in (last, speaker)
             and away >= near
             and is_present(row, entity)
-            and (entity != AGENT or _agent_may_hear(row, speaker))
+            and (entity != AGENT or _may_hear(row, speaker))
         ):
             put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance, speaker, noun)
         last = entity
         table += FrameColumn.COLUMNS
 
 
+@outline
+def reach_seats(row: Row, speaker: int, line: int) -> None:
+    """A line is heard by the players of the seats, other than the agent's and the speaker's own, within earshot."""
+    stay_outline()
+    if not _may_hear(row, speaker):
+        return
+    for seat in range(1, seats_played(row)):
+        member = seat_word(row, seat, SeatColumn.ENTITY)
+        if member != speaker and is_present(row, member) and within_earshot(row, speaker, member):
+            hear_on_seat(row, seat, line)
+
+
 @inline
 def speak(row: Row, speaker: int, line: int) -> None:
     """An NPC says a line: the agent hears it if it may and is near, and so do NPCs for whom it means something."""
     utterance = _line(row, line, LineColumn.CLASS)
+    if row.program[Header.FLAGS] & Flag.SEATS:
+        reach_seats(row, speaker, line)
     if (
         utterance < SECRET
-        and _agent_may_hear(row, speaker)
+        and _may_hear(row, speaker)
         and is_present(row, AGENT)
         and within_earshot(row, speaker, AGENT)
     ):

@@ -1,7 +1,8 @@
 """The state of a batch of environments: few arrays, one row for each environment.
 
 `State` is all that persists and is all a snapshot needs, `Ports` is what goes in and out of a call, `Row` is what the
-functions of the engine see of one environment. Axis letters: E environments, R registers, L tokens, H x W canvas.
+functions of the engine see of one environment. Axis letters: E environments, S seats that callers play, R registers,
+L tokens, H x W canvas. What each seat has is in row e * S + s, or of tokens and digests side by side in row e.
 """
 
 from enum import IntEnum
@@ -78,7 +79,9 @@ class Link(IntEnum):
     SUCCESS_AT = 16  # for each way to end whether it is a success
     LOOK_AT = 17  # for each look its channel, counted from the fifth
     LOOK_REGISTER_AT = 18  # for each entity the register of each look
-    END = 19
+    SEATS = 19  # seats that callers of the batch play, the agent's included
+    TOKENS = 20  # tokens in a history of the batch
+    END = 21
 
 
 class Trait(IntEnum):
@@ -132,7 +135,8 @@ class ArrayId(IntEnum):
     REFUSED = 30
     PICTURE = 31
     SIZES = 32
-    FLAT_ACTIONS = 33  # int64 (heads E), the rows of ACTIONS one behind the other
+    TAKEN = 33
+    FLAT_ACTIONS = 34  # int64 (heads E S), the rows of ACTIONS one behind the other
 
 
 class Size(IntEnum):
@@ -142,7 +146,8 @@ class Size(IntEnum):
     BOARD = 1
     TOKENS = 2
     EXTRA = 3
-    END = 4
+    SEATS = 4
+    END = 5
 
 
 class State(NamedTuple):
@@ -152,14 +157,14 @@ class State(NamedTuple):
     boards: NDArray[
         np.uint32
     ]  # (E, H * W + 1 + 2 * H + W or more) cells as seen, the last off the canvas; solid, opaque rows; opaque columns
-    keys: NDArray[np.uint64]  # (E, Key.WORDS)
-    tokens: NDArray[np.int16]  # (E, L)
+    keys: NDArray[np.uint64]  # (E, Key.WORDS + S - 1), the last as Key.DIGEST of seats other than the agent's
+    tokens: NDArray[np.int16]  # (E, S L)
     image: NDArray[
         np.uint32
-    ]  # (E, 49) packed cells, from the agent's left to its right, each from far to near
+    ]  # (E S, 49) packed cells, from the player's left to its right, each from far to near
     extra: NDArray[
         np.uint16
-    ]  # (E, (49 N + 1) // 2) the bytes of the N channels behind the fourth, cell by cell
+    ]  # (E S, (49 N + 1) // 2) the bytes of the N channels behind the fourth, cell by cell
 
 
 class Tables(NamedTuple):
@@ -178,20 +183,20 @@ class Tables(NamedTuple):
 class Ports(NamedTuple):
     """The data that a call reads and writes besides the state."""
 
-    actions: NDArray[np.int64]  # (E, 3 + slots)
+    actions: NDArray[np.int64]  # (E S, 3 + slots)
     pins: NDArray[np.int32]  # (layouts, R + 1) value of each register or UNPINNED; last: member of the pool
     layout: NDArray[np.int32]  # (E,) row of the pins that the next reset uses
     chosen: NDArray[np.bool_]  # (E,) rows that a reset is for
-    reward: NDArray[np.float64]  # (E,)
+    reward: NDArray[np.float64]  # (E S,)
     terminated: NDArray[np.bool_]  # (E,)
     truncated: NDArray[np.bool_]  # (E,)
     outcome: NDArray[np.int32]  # (E,) of the episode that ended in this step, else -1
-    final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
-    final_tokens: NDArray[np.int16]  # (E, L)
+    final_image: NDArray[np.uint32]  # (E S, 49) last picture of an episode that was reset in the same step
+    final_tokens: NDArray[np.int16]  # (E, S L)
     final_extra: NDArray[np.uint16]  # as `extra`
     success: NDArray[
         np.bool_
-    ]  # (E,) whether an episode ended in this step, and was a success in all its acts
+    ]  # (E S,) whether an episode ended in this step, and was a success in all its acts
     ended: NDArray[np.bool_]  # (E,) terminated or truncated
     counters: NDArray[np.int64]  # (counters of all programs,)
     scratch: NDArray[np.int64]  # (TEMPORARIES,)
@@ -199,12 +204,13 @@ class Ports(NamedTuple):
     spare_registers: NDArray[np.int32]  # (R,) of a row that is played on for a look
     spare_boards: NDArray[np.uint32]  # (board,)
     spare_counters: NDArray[np.int64]  # (counters of all programs,)
-    image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
+    image_ids: NDArray[np.uint64]  # (E S,) digests of the pictures
     refused: NDArray[np.bool_]  # (E,) rows that were reset and found no room that is as required
     picture: NDArray[
         np.uint16
-    ]  # bytes of `image` and `extra` cell by cell, (E, (49 (4 + N) + 1) // 2); or (E, 0)
+    ]  # bytes of `image` and `extra` cell by cell, (E S, (49 (4 + N) + 1) // 2); or (E S, 0)
     sizes: NDArray[np.int64]  # (Size.END,)
+    taken: NDArray[np.bool_]  # (E S,) where a player sits; the agent's is always so
 
 
 class Row(NamedTuple):
@@ -221,35 +227,38 @@ class Row(NamedTuple):
     sets: NDArray[np.uint32]  # line y of board b is number b * MAX_SIDE + y
 
 
-def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, more: int) -> State:
+def empty_state(
+    rows: int, registers: int, board: int, tokens: int, view: int, more: int, seats: int = 1
+) -> State:
     """A state of zeros, with `more` channels behind the fourth; every row must be reset before it is used."""
     return State(
         registers=np.zeros((rows, registers), REGISTER),
         boards=np.zeros((rows, board), np.uint32),
-        keys=np.zeros((rows, Key.WORDS), np.uint64),
-        tokens=np.zeros((rows, tokens), TOKEN),
-        image=np.zeros((rows, view * view), np.uint32),
-        extra=np.zeros((rows, (view * view * more + 1) // 2), np.uint16),
+        keys=np.zeros((rows, Key.WORDS + seats - 1), np.uint64),
+        tokens=np.zeros((rows, seats * tokens), TOKEN),
+        image=np.zeros((rows * seats, view * view), np.uint32),
+        extra=np.zeros((rows * seats, (view * view * more + 1) // 2), np.uint16),
     )
 
 
 def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
     """Ports that fit a state with `more` channels behind the fourth, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
+    players = len(state.image)
     picture = (state.image.shape[1] * (4 + more) + 1) // 2 if more else 0
     return Ports(
-        actions=np.zeros((rows, 3 + slots), np.int64),
+        actions=np.zeros((players, 3 + slots), np.int64),
         pins=no_pins(registers),
         layout=np.zeros(rows, np.int32),
         chosen=np.ones(rows, np.bool_),
-        reward=np.zeros(rows, np.float64),
+        reward=np.zeros(players, np.float64),
         terminated=np.zeros(rows, np.bool_),
         truncated=np.zeros(rows, np.bool_),
         outcome=np.full(rows, -1, REGISTER),
         final_image=np.zeros_like(state.image),
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
-        success=np.zeros(rows, np.bool_),
+        success=np.zeros(players, np.bool_),
         ended=np.zeros(rows, np.bool_),
         counters=np.zeros(counters, np.int64),
         scratch=np.zeros(TEMPORARIES, np.int64),
@@ -257,13 +266,14 @@ def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
         spare_registers=np.zeros(registers, REGISTER),
         spare_boards=np.zeros(state.boards.shape[1], np.uint32),
         spare_counters=np.zeros(counters, np.int64),
-        image_ids=np.zeros(rows, np.uint64),
+        image_ids=np.zeros(players, np.uint64),
         refused=np.zeros(rows, np.bool_),
-        picture=np.zeros((rows, picture), np.uint16),
+        picture=np.zeros((players, picture), np.uint16),
         sizes=np.array(
-            [registers, state.boards.shape[1], state.tokens.shape[1], state.extra.shape[1]],
+            [registers, state.boards.shape[1], state.tokens.shape[1], state.extra.shape[1], players // rows],
             np.int64,
         ),
+        taken=np.ones(players, np.bool_),
     )
 
 

@@ -1,9 +1,19 @@
-"""Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
+"""Turns: the body actions of players and NPCs, and how an NPC follows its frames."""
 
-from socialai_dsl.engine.boards import draw_cell, draw_npc, is_solid, npcs_are_hidden, type_row
+import numpy as np
+
+from socialai_dsl.engine.boards import (
+    draw_cell,
+    draw_npc,
+    is_deadly_under,
+    is_solid,
+    npcs_are_hidden,
+    type_row,
+)
 from socialai_dsl.engine.carrying import pick_up, put_down
 from socialai_dsl.engine.entities import (
     field,
+    is_at,
     is_present,
     npc_at,
     object_at,
@@ -15,10 +25,30 @@ from socialai_dsl.engine.jit import inline, merged, outline, stay_outline
 from socialai_dsl.engine.operands import draw_action, value
 from socialai_dsl.engine.paths import face
 from socialai_dsl.engine.pushing import is_free, push, push_aside, roll
-from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
+from socialai_dsl.engine.seats import seat_register, seat_value, seat_word, seats_played, taken_seat_of
+from socialai_dsl.engine.speech import (
+    deliver,
+    empty_inbox,
+    hear,
+    hear_on_seat,
+    inbox_class,
+    reach_seats,
+    speak,
+)
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
 from socialai_dsl.engine.vm import answer, past_tests, run
-from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Op, Register, TypeColumn
+from socialai_dsl.program import (
+    Body,
+    Field,
+    Flag,
+    FrameColumn,
+    Header,
+    Op,
+    Register,
+    SeatColumn,
+    SeatRegister,
+    TypeColumn,
+)
 
 
 @merged
@@ -107,7 +137,7 @@ def move_agent(row: Row, action: int) -> None:
     direction = field(row, AGENT, Field.DIR)
     x = field(row, AGENT, Field.X)
     set_field(row, AGENT, Field.LAST, action)
-    if x < 0:
+    if not is_present(row, AGENT):
         return
     if action == Body.FORWARD:
         x += step_x(direction)
@@ -128,9 +158,27 @@ def move_agent(row: Row, action: int) -> None:
         use_hands(row, AGENT, action)
 
 
+@inline
+def _may_enter(row: Row, x: int, y: int, is_player: bool) -> bool:
+    """Whether a member of the cast other than the agent goes to a cell that is not solid."""
+    if not is_player:
+        return is_free(row, x, y)
+    return npcs_are_hidden(row) or (npc_at(row, x, y) == 0 and not is_at(row, AGENT, x, y))
+
+
+@inline
+def _use_ahead(row: Row, npc: int, x: int, y: int, is_player: bool) -> int:
+    """Toggle the object in a cell, or if a player moves the body poke another member there; its number or 0."""
+    poked = npc_at(row, x, y) if is_player else ZERO
+    if poked == 0:
+        return _toggle_object(row, x, y)
+    set_field(row, poked, Field.POKED, ONE)
+    return poked
+
+
 @outline
-def move_npc(row: Row, npc: int, action: int) -> None:
-    """The body action of an NPC. It never enters a cell that is solid, deadly or taken."""
+def move_npc(row: Row, npc: int, action: int, is_player: bool) -> None:
+    """The body action of an NPC, which never enters a cell that is solid, deadly or taken; or of a player on a seat."""
     stay_outline()
     direction = field(row, npc, Field.DIR)
     x = field(row, npc, Field.X)
@@ -145,15 +193,18 @@ def move_npc(row: Row, npc: int, action: int) -> None:
         if is_solid(row, ahead_x, ahead_y):
             if row.program[Header.FLAGS] & Trait.PUSHED:
                 push(row, ahead_x, ahead_y, direction, ZERO)
-        elif is_free(row, ahead_x, ahead_y):
+        elif _may_enter(row, ahead_x, ahead_y, is_player):
             set_field(row, npc, Field.X, ahead_x)
             set_field(row, npc, Field.Y, ahead_y)
             draw_cell(row, x, y)
-            draw_npc(row, npc)
+            if is_player:
+                draw_cell(row, ahead_x, ahead_y)  # another hidden one may be there
+            else:
+                draw_npc(row, npc)
         elif row.program[Header.FLAGS] & Trait.PUSHED:
             push_aside(row, ahead_x, ahead_y, direction)
     elif action == Body.TOGGLE:
-        set_field(row, npc, Field.TOGGLED, _toggle_object(row, ahead_x, ahead_y))
+        set_field(row, npc, Field.TOGGLED, _use_ahead(row, npc, ahead_x, ahead_y, is_player))
     elif action == Body.STOP_POINTING:
         set_field(row, npc, Field.POINTING, ZERO)
     elif row.program[Header.FLAGS] & Flag.CARRYING:
@@ -249,11 +300,37 @@ def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
         if not chosen:
             action = act(row, frame)
         if action != Body.NONE:
-            move_npc(row, npc, action)
+            move_npc(row, npc, action, np.bool_(False))
             set_field(row, npc, Field.LAST, action)
         table = state_table(row, frame)
     settle(row)
     conclude(row, frame, table, heard, chosen, flags)
+
+
+@outline
+def _accompany(row: Row, frame: int, npc: int, seat: int, flags: int) -> None:
+    """One turn of a frame of a member whose seat is taken: without body and voice, which are the player's.
+
+    What the frame chose is the seat's wish.
+    """
+    stay_outline()
+    registers = row.registers
+    pointing = field(row, npc, Field.POINTING)
+    noted = seat_word(row, seat, SeatColumn.SAID)
+    said = registers[noted]
+    heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
+    perceive(row, frame, flags)
+    chosen = notice(row, row.program[state_table(row, frame) + 1 + heard])
+    if is_present(row, npc):
+        wish = registers[Register.LAST_TURN] if chosen else act(row, frame)
+        set_field(row, npc, Field.POINTING, pointing)
+        settle(row)
+        conclude(row, frame, state_table(row, frame), heard, chosen, flags)
+        registers[seat_register(row, seat, SeatRegister.WISH)] = wish
+        registers[seat_register(row, seat, SeatRegister.WISH_LINE)] = registers[Register.SAID_LINE]
+    registers[Register.SAID_LINE] = 0
+    if noted != 0:
+        registers[noted] = said
 
 
 @merged
@@ -269,12 +346,17 @@ def take_turns(row: Row) -> None:
     last = NOTHING
     while number < frames:
         npc = row.program[frame + FrameColumn.ENTITY]
+        seat = taken_seat_of(row, npc)
         if npc != last:
-            set_field(row, npc, Field.LAST, STILL)
-            set_field(row, npc, Field.TOGGLED, ZERO)
+            if seat == 0:
+                set_field(row, npc, Field.LAST, STILL)
+                set_field(row, npc, Field.TOGGLED, ZERO)
             last = npc
         if is_present(row, npc):
-            _follow(row, frame, npc, flags)
+            if seat == 0:
+                _follow(row, frame, npc, flags)
+            else:
+                _accompany(row, frame, npc, seat, flags)
         number += 1
         inbox = row.program[frame + FrameColumn.INBOX]
         frame += FrameColumn.COLUMNS
@@ -290,9 +372,69 @@ def take_turns(row: Row) -> None:
 def say_as_agent(row: Row) -> None:
     """The agent's utterance reaches the NPCs near it, and the agent itself where it hears its own voice."""
     utterance = row.registers[Register.CLASS]
-    if utterance == 0 or field(row, AGENT, Field.X) < 0:  # out of the room nobody hears it
+    if utterance == 0 or not is_present(row, AGENT):  # out of the room nobody hears it
         return
     deliver(row, AGENT, utterance, row.registers[Register.NOUN])
-    if row.program[Header.FLAGS] & Flag.OWN_VOICE and row.program[Header.AGENT_SAYS] > 0:
+    if row.program[Header.FLAGS] & (Flag.OWN_VOICE | Flag.SEATS) and row.program[Header.AGENT_SAYS] > 0:
         pair = row.registers[Register.TEMPLATE] * row.program[Header.NOUNS]
-        hear(row, row.program[Header.AGENT_SAYS] - 1 + pair + row.registers[Register.NOUN])
+        line = row.program[Header.AGENT_SAYS] - 1 + pair + row.registers[Register.NOUN]
+        if row.program[Header.FLAGS] & Flag.OWN_VOICE:
+            hear(row, line)
+        if row.program[Header.FLAGS] & Flag.SEATS:
+            reach_seats(row, AGENT, line)
+
+
+# -- players on other seats ----------------------------------------------------------------------------------
+
+
+@outline
+def move_players(row: Row) -> None:
+    """The body actions of the players on seats other than the agent's, one after the other."""
+    stay_outline()
+    for seat in range(1, seats_played(row)):
+        if seat_value(row, seat, SeatRegister.TAKEN) == 0:
+            continue
+        npc = seat_word(row, seat, SeatColumn.ENTITY)
+        action = seat_value(row, seat, SeatRegister.ACTION)
+        if is_present(row, npc) and action != Body.NONE:
+            move_npc(row, npc, action, np.bool_(True))
+
+
+@outline
+def speak_as_players(row: Row) -> None:
+    """What the players on seats other than the agent's say is heard, one after the other."""
+    stay_outline()
+    for seat in range(1, seats_played(row)):
+        line = seat_value(row, seat, SeatRegister.LINE) - 1
+        npc = seat_word(row, seat, SeatColumn.ENTITY)
+        if line >= 0 and is_present(row, npc):
+            if row.program[Header.FLAGS] & Flag.OWN_VOICE:
+                hear_on_seat(row, seat, line)
+            speak(row, npc, line)
+
+
+@outline
+def bury(row: Row) -> bool:
+    """Let members die whose seats are taken and who stand on a deadly cell; whether that leaves none in the room."""
+    stay_outline()
+    somebody_died = _dies(row, AGENT)
+    somebody_lives = is_present(row, AGENT)
+    for seat in range(1, seats_played(row)):
+        npc = seat_word(row, seat, SeatColumn.ENTITY)
+        if seat_value(row, seat, SeatRegister.TAKEN) != 0:
+            somebody_died |= _dies(row, npc)
+            somebody_lives |= is_present(row, npc)
+    return somebody_died and not somebody_lives
+
+
+@inline
+def _dies(row: Row, who: int) -> bool:
+    """Whether a member of the cast stands on a deadly cell; then it is no longer in the room."""
+    x = field(row, who, Field.X)
+    y = field(row, who, Field.Y)
+    if not is_present(row, who) or not is_deadly_under(row, x, y):
+        return False
+    set_field(row, who, Field.GONE, ONE)
+    row.registers[Register.CHANGED] = 1
+    draw_cell(row, x, y)
+    return True

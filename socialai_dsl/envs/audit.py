@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.program import Flag, FrameColumn, Header, Program, Register, room_words
+from socialai_dsl.program import (
+    Body,
+    Flag,
+    FrameColumn,
+    Header,
+    Program,
+    Register,
+    SeatColumn,
+    SeatRegister,
+    room_words,
+)
 from socialai_dsl.program.instructions import Interval
 from socialai_dsl.program.program import bounds_of
 from socialai_dsl.widths import WHOLE_REGISTER
@@ -50,10 +60,33 @@ def _ranges(program: Program) -> list[Interval]:
     line = (0, max(h(Header.LINES) - 1, 0))
     for first, size in ((h(Header.LOG), h(Header.LOG_SIZE)), (h(Header.HEARD), h(Header.HEARD_SIZE))):
         ranges[first : first + size] = [line] * size
+    for row in program.seat_table.tolist():
+        for which, interval in _of_seat(program).items():
+            ranges[row[SeatColumn.FIRST] + which] = interval
+        for first, size in (
+            (row[SeatColumn.LOG], h(Header.LOG_SIZE)),
+            (row[SeatColumn.HEARD], h(Header.HEARD_SIZE)),
+        ):
+            ranges[first : first + size] = [line] * size
     inbox = _inbox(program)
     for first in program.table(Header.FRAME_AT)[:, FrameColumn.INBOX].tolist():
         ranges[first : first + len(inbox)] = inbox
     return ranges
+
+
+def _of_seat(program: Program) -> dict[SeatRegister, Interval]:
+    """The ranges of the registers of a seat other than the agent's that have no name."""
+    h = program.header
+    lines = (0, h(Header.LINES))
+    return {
+        SeatRegister.LINE: lines,
+        SeatRegister.HEARD: (0, h(Header.HEARD_SIZE)),
+        SeatRegister.LOGGED: (0, h(Header.LOG_SIZE)),
+        SeatRegister.TOKENS: (0, h(Header.TOKENS)),
+        SeatRegister.OLDEST: (0, max(h(Header.LOG_SIZE) - 1, 0)),
+        SeatRegister.WISH: (0, Body.STOP_POINTING),
+        SeatRegister.WISH_LINE: lines,
+    }
 
 
 def _rooms_that_fit(program: Program) -> int:

@@ -21,6 +21,8 @@ from socialai_dsl.program import (
     Program,
     Register,
     RegisterName,
+    SeatColumn,
+    SeatRegister,
     place_of,
 )
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, NOUN, TURN_WORDS
@@ -74,18 +76,22 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
     return state
 
 
-def history(program: Program, registers: Row) -> list[str]:
-    """Lines heard since the reset, as far as they are kept, oldest first."""
-    return _history(program, registers.tolist())
+def history(program: Program, registers: Row, seat: int = 0) -> list[str]:
+    """Lines that the player on a seat heard since the reset, as far as they are kept, oldest first."""
+    return _history(program, registers.tolist(), seat)
 
 
 Held = Sequence[int]
 """The registers as numbers of Python, which are read faster than an array."""
 
 
-def _history(program: Program, registers: Held) -> list[str]:
+def _history(program: Program, registers: Held, seat: int = 0) -> list[str]:
     log, size = program.header(Header.LOG), max(program.header(Header.LOG_SIZE), 1)
     oldest, logged = registers[Register.OLDEST], registers[Register.LOGGED]
+    if seat > 0:
+        row = program.seat_table[seat - 1].tolist()
+        log, first = row[SeatColumn.LOG], row[SeatColumn.FIRST]
+        oldest, logged = registers[first + SeatRegister.OLDEST], registers[first + SeatRegister.LOGGED]
     return [program.lines[registers[log + place % size]] for place in range(oldest, oldest + logged)]
 
 

@@ -44,7 +44,7 @@ from socialai_dsl.vocabulary import spelt
 
 @dataclass
 class Recording:
-    """A moment, and the actions since then, int64 (heads,) as bytes each."""
+    """A moment, and the actions of all seats since then, int64 (S, heads) as bytes each."""
 
     start: Start
     actions: list[bytes] = field(default_factory=list)
@@ -165,15 +165,22 @@ class Explainer:
         program: what the environment plays. scenario: what it was compiled from.
         suite: the suite it is a member of, None if it plays alone.
         number: which member it is.
+        taken: on which of the seats that the environment plays somebody sits, bool (S,).
     """
 
     def __init__(
-        self, program: Program, scenario: CheckedScenario, suite: ProgramSuite | None, number: int
+        self,
+        program: Program,
+        scenario: CheckedScenario,
+        suite: ProgramSuite | None,
+        number: int,
+        taken: NDArray[np.bool_],
     ) -> None:
         self._checked = scenario
         self._program = program
         self._noting = compile_noting(scenario)
-        self._table = Table([_alone(self._noting.program, suite, number)], 1)
+        self._table = Table([_alone(self._noting.program, suite, number)], 1, all_seats=len(taken) > 1)
+        self._table.set_taken(taken)
         self._table.reset(0, None)
 
     def explain(self, recording: Recording, reached: NDArray[np.int32] | None) -> dict[str, Any]:
@@ -208,7 +215,7 @@ class Explainer:
         for action in recording.actions:
             state.registers[0, self._noting.first :] = 0
             before = batch.counters.copy()
-            batch.ports.actions[0] = np.frombuffer(action, np.int64)
+            batch.ports.actions[:] = np.frombuffer(action, np.int64).reshape(batch.ports.actions.shape)
             batch.step(Task.STEP_ONLY)
         return np.asarray(batch.counters - before)
 

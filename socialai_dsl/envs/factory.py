@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Never
+from typing import TYPE_CHECKING, Any, Never
 
 from gymnasium.vector import AutoresetMode
 
@@ -12,10 +12,14 @@ from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.envs.seats import Seating
 from socialai_dsl.envs.starts import check_starts
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable, ProgramSuite
+
+if TYPE_CHECKING:
+    from socialai_dsl.envs.parallel_env import ScenarioParallelEnv
 
 Scenario = str | Path | Playable
 
@@ -45,25 +49,57 @@ def compiled(loaded: Loaded) -> Playable:
     return playable
 
 
-def make(scenario: Scenario, render_mode: str | None = None, **unknown: Never) -> ScenarioEnv:
+def make(
+    scenario: Scenario,
+    render_mode: str | None = None,
+    seats: Mapping[str, Any] | None = None,
+    **unknown: Never,
+) -> ScenarioEnv:
     """One environment of a scenario or suite: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
 
     Args:
         scenario: a shipped name or the path of a file, with variants (`+unsocial`) and parameters (`?n=2`); or what
             `compile` returned.
         render_mode: see `ScenarioEnv`.
+        seats: who fills the seats of other members of the cast: `{"helper": "random"}`; see `ScenarioVectorEnv`.
         **unknown: there are no other options; one is refused by its name.
 
     Raises:
         ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
         ValueError: an argument is not what was expected, or there is no such option.
     """
-    _refuse_unknown("make", unknown, ("scenario", "render_mode"))
+    _refuse_unknown("make", unknown, ("scenario", "render_mode", "seats"))
     _check_scenario(scenario)
     if isinstance(scenario, Playable):
-        return ScenarioEnv(scenario, render_mode)
+        return ScenarioEnv(scenario, render_mode, seats=seats)
     loaded = load(scenario)
-    return ScenarioEnv(compiled(loaded), render_mode, scenarios_of(loaded))
+    return ScenarioEnv(compiled(loaded), render_mode, scenarios_of(loaded), seats)
+
+
+def make_parallel(
+    scenario: Scenario, render_mode: str | None = None, **unknown: Never
+) -> ScenarioParallelEnv:
+    """One game with several seats as a parallel environment of PettingZoo: `make_parallel("together/help")`.
+
+    Args:
+        scenario: as for `make`, but no suite.
+        render_mode: see `ScenarioEnv`.
+        **unknown: there are no other options; one is refused by its name.
+
+    Raises:
+        ModuleNotFoundError: PettingZoo is not installed; the extra `pettingzoo` brings it.
+        ScenarioError: the scenario does not exist or has mistakes.
+        ValueError: an argument is not what was expected, or there is no such option.
+    """
+    _refuse_unknown("make_parallel", unknown, ("scenario", "render_mode"))
+    _check_scenario(scenario)
+    try:
+        from socialai_dsl.envs.parallel_env import ScenarioParallelEnv
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            f"{error}: make_parallel needs pip install 'socialai-dsl[pettingzoo]'"
+        ) from error
+    return ScenarioParallelEnv(playable_of(scenario), render_mode)  # type: ignore[arg-type]
 
 
 def make_vec(
@@ -73,6 +109,7 @@ def make_vec(
     autoreset_mode: str | AutoresetMode = "NextStep",
     copy: bool = True,
     render_mode: str | None = None,
+    seats: Seating = "agent",
     **unknown: Never,
 ) -> ScenarioVectorEnv:
     """A batch of environments: one scenario or suite, or several in turn.
@@ -84,6 +121,8 @@ def make_vec(
         autoreset_mode: `NextStep`, `SameStep` or `Disabled`.
         copy: False returns the engine's own buffers, valid until the next call.
         render_mode: `rgb_array`, `ansi` or None.
+        seats: `agent`; `all`, a row for each seat of each of the E games; or who fills other seats, such as
+            `{"helper": "random"}`; see `ScenarioVectorEnv`.
         **unknown: there are no other options; one is refused by its name.
 
     Raises:
@@ -97,11 +136,13 @@ def make_vec(
         _check_scenario(name)
     made = {name: playable_of(name) for name in dict.fromkeys(names)}
     return ScenarioVectorEnv(
-        [made[name] for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode
+        [made[name] for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode, seats
     )
 
 
-_OPTIONS_OF_BATCHES = ("scenario", "num_envs", "num_threads", "autoreset_mode", "copy", "render_mode")
+_OPTIONS_OF_BATCHES = (
+    *("scenario", "num_envs", "num_threads", "autoreset_mode", "copy", "render_mode", "seats"),
+)
 
 
 def make_env(scenario: Scenario, render_mode: str | None = None, **unknown: Any) -> ScenarioEnv:

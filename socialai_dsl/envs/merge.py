@@ -163,5 +163,7 @@ def _highest_codes(program: Program) -> tuple[int, int, int, int]:
         max(int(types[:, TypeColumn.CODE].max()), int((cells & 255).max())),
         5,
         max(kinds, int(types[:, TypeColumn.STATUS].max()), int((cells >> 16 & 255).max())),
-        max(3, int(types[:, TypeColumn.ORIENTATION].max()), int((cells >> 24).max())),
+        max(
+            3, len(program.seat_table), int(types[:, TypeColumn.ORIENTATION].max()), int((cells >> 24).max())
+        ),
     )

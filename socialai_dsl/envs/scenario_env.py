@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -17,6 +17,7 @@ from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.explain import Explainer, Recording
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
+from socialai_dsl.envs.seats import Company, Seats
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import whole_number
 from socialai_dsl.envs.view import View
@@ -157,21 +158,30 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         program: what `socialai_dsl.compile` returns, for a scenario or a suite.
         render_mode: `rgb_array`, `ansi`, or `human`, which prints the room after every step.
         scenarios: what the program, or each of a suite's, was compiled from; `scenario` and `explain` need it.
+        seats: who fills the seats of other members of the cast; see `ScenarioVectorEnv`. By default the caller is the
+            agent, and all others follow their frames.
 
     Raises:
-        ValueError: there is no such render mode.
+        ValueError: there is no such render mode, or no such seat or player.
     """
 
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
 
     def __init__(
-        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[CheckedScenario] = ()
+        self,
+        program: Playable,
+        render_mode: str | None = None,
+        scenarios: Sequence[CheckedScenario] = (),
+        seats: Mapping[str, Any] | None = None,
     ) -> None:
         if not isinstance(program, Playable):
             raise ValueError(f"program: got {program!r}; expected what `compile` returns")
         self.program = program
         self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
-        self._table = Table([program], 1)
+        self._table = Table([program], 1, all_seats=seats is not None)
+        seated = Seats.of("agent" if seats is None else seats, self._table.programs)
+        self._player = seated.own or 0
+        self._company = Company(seated, self._table) if seats is not None else None
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
         self._shape = self.action_space.nvec.shape
@@ -190,13 +200,13 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _find_row(self) -> None:
         """Look up what a step needs of the one row: asking an array takes longer than the engine takes for a step."""
-        ports = self._table.batch.ports
-        self._copy_image, self._copy_tokens = self._table.image[0].copy, self._table.tokens[0].copy
+        ports, own = self._table.batch.ports, self._player
+        self._copy_image, self._copy_tokens = self._table.image[own].copy, self._table.tokens[own].copy
         self._registers = self._table.state.registers[0]
         self._numbers = self._registers.data
         self._key = self._table.state.keys[0].data
-        self._action = ports.actions[0].data.cast("B")
-        self._reward, self._success = ports.reward.data, ports.success.data
+        self._action = ports.actions[own].data.cast("B")
+        self._reward, self._success = ports.reward.data[own:], ports.success.data[own:]
         self._play = self._table.stepper(Task.STEP_ONLY)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -239,11 +249,13 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         super().reset(seed=seed)
         # Still so where `reset_mask` is False.
         self._ended = not self._table.all_begun or bool(self._registers[Register.ENDED])
-        self._history = "\n".join(self._table.history(0))
+        self._history = "\n".join(self._table.history(self._player))
         if self.render_mode == "human":
             self.render()
         self._look_up()
         self._record()
+        if self._company is not None:
+            self._company.begin(self._table.batch.ports.chosen.copy())
         return self._observation(), {"utterance": SILENCE, "history": self._history, **self._always}
 
     def step(
@@ -269,6 +281,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         if given.shape != self._shape or given.dtype is not _INT64:
             given = self._converted(action, given)
         self._action[:] = words = given.tobytes()
+        if self._company is not None:
+            words = self._with_partners(given)
         ended = self._play()
         if ended < 0:
             raise self._table.batch.refused_room() if ended != BAD_ACTION else self._refusal(action)
@@ -279,8 +293,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         if self._always:
             info |= self._always
         if self._numbers[_HEARD]:
-            self._history = "\n".join(self._table.history(0))
-            info |= {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
+            self._history = "\n".join(self._table.history(self._player))
+            info |= {"utterance": "\n".join(self._table.heard(self._player)), "history": self._history}
         terminated = truncated = False
         if ended:
             self._ended = True
@@ -295,6 +309,13 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             self.render()
         return self._observation(), self._reward[0], terminated, truncated, info
 
+    def _with_partners(self, own: NDArray[np.int64]) -> bytes:
+        """Let the other seats act as well; the actions of all seats."""
+        assert self._company is not None, "internal: there are no partners"
+        actions = self._table.batch.ports.actions
+        actions[:] = self._company.act(own[None])
+        return actions.tobytes()
+
     def _record(self) -> None:
         """Remember from here on what is done."""
         self._recording, self._last_act = Recording(self._table.start(0)), None
@@ -306,7 +327,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         else:
             self._last_act, self._recording = self._recording, Recording(self._table.start(0))
             self._look_up()
-            self._history = "\n".join(self._table.history(0))
+            self._history = "\n".join(self._table.history(self._player))
 
     def _look_up(self) -> None:
         """Look up which program this episode plays."""
@@ -393,7 +414,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         scenario = self._scenario(number)
         if program.sha256 not in self._explainers:
             suite = self.program if isinstance(self.program, ProgramSuite) else None
-            self._explainers[program.sha256] = Explainer(program, scenario, suite, number)
+            taken = self._table.batch.ports.taken
+            self._explainers[program.sha256] = Explainer(program, scenario, suite, number, taken)
         # Where another act has begun, the registers are that one's.
         reached = self._registers if self._last_act is None else None
         return self._explainers[program.sha256].explain(recording, reached)
@@ -412,7 +434,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         self._look_up()
         self._record()
         self._ended = bool(self._registers[Register.ENDED])
-        self._history = "\n".join(self._table.history(0))
+        self._history = "\n".join(self._table.history(self._player))
 
     def counters(self) -> dict[str, Any]:
         """Counts since the environment was made.
@@ -436,7 +458,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         text = frame(self._table, 0, "ansi")
         if self.render_mode == "ansi":
             return text
-        heard = "\n".join(self._table.heard(0))
+        heard = "\n".join(self._table.heard(self._player))
         print(f"{text}\n{heard}\n")
         return None
 

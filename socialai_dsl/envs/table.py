@@ -23,8 +23,21 @@ from socialai_dsl.envs.merge import CommonSpace
 from socialai_dsl.envs.options import each, reset_options
 from socialai_dsl.envs.starts import Starts
 from socialai_dsl.envs.values import whole_number, word
-from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
+from socialai_dsl.program import (
+    FIRST_ENTITY,
+    LOOKS,
+    VIEW,
+    Field,
+    Flag,
+    FrameColumn,
+    Header,
+    Program,
+    Register,
+    SeatColumn,
+    SeatRegister,
+)
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
+from socialai_dsl.vocabulary import TURN_WORDS
 from socialai_dsl.widths import REGISTER, UNPINNED
 
 Image = NDArray[np.uint8]
@@ -137,6 +150,33 @@ def too_early(call: str, fresh: NDArray[np.bool_]) -> ValueError:
     )
 
 
+def heard_at(program: Program, seat: int) -> tuple[int, int]:
+    """Of what a seat heard in the last step the registers of the number of lines and of the first one."""
+    if seat == 0:
+        return int(Register.HEARD), program.header(Header.HEARD)
+    row = program.seat_table[seat - 1].tolist()
+    return row[SeatColumn.FIRST] + SeatRegister.HEARD, row[SeatColumn.HEARD]
+
+
+def _common_seats(programs: Sequence[Program], in_acts: Sequence[bool]) -> int:
+    """How many seats all programs have.
+
+    Raises:
+        ValueError: they do not have as many, or an episode is played in acts.
+    """
+    counts = {program.name: len(program.seats) for program in programs}
+    if len(set(counts.values())) > 1:
+        listed = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise ValueError(
+            f"seats: got scenarios with different numbers of them, {listed}; expected equal ones"
+        )
+    if any(in_acts) and max(counts.values()) > 1:
+        raise ValueError(
+            "seats: got a suite whose episodes are played in acts; expected a scenario, or one seat"
+        )
+    return max(counts.values())
+
+
 class HeardLines(NamedTuple):
     """The lines that the agents of E environments heard in a step, at most K each, in the order spoken.
 
@@ -160,11 +200,14 @@ class Start(NamedTuple):
 class Table(Copied):
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
+    Each row has `seats` players: player number e * S + s sits on seat s of row e.
+
     Attributes:
-        image: uint8 (E, 7, 7, channels), tokens: int16 (E, L): buffers that every call writes to.
+        rows: E. seats: S. players: E S.
+        image: uint8 (E S, 7, 7, channels), tokens: int16 (E S, L): buffers that every call writes to.
     """
 
-    def __init__(self, playables: Sequence[Playable], rows: int) -> None:
+    def __init__(self, playables: Sequence[Playable], rows: int, all_seats: bool = False) -> None:
         different = list({id(playable): playable for playable in playables}.values())
         self.merged = CommonSpace.of(different)
         self.programs = self.merged.programs
@@ -172,14 +215,17 @@ class Table(Copied):
         numbers = np.array([number[id(playable)] for playable in playables])
         self.pool_of = numbers[np.arange(rows) % len(numbers)]
         self._plays_acts = [isinstance(p, ProgramSuite) and p.in_sequence for p in different]
+        self.seats = _common_seats(self.programs, self._plays_acts) if all_seats else 1
         self.batch = Batch(
             self.merged.parts,
             self.merged.pools,
             self.pool_of.tolist(),
             self.merged.length,
             [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
+            self.seats,
         )
         self.rows = rows
+        self.players = rows * self.seats
         self.channels = len(self.merged.channels)
         self._find_buffers()
         self.fresh = np.ones(self.rows, np.bool_)
@@ -197,7 +243,8 @@ class Table(Copied):
         """Look up the arrays of the batch that callers see."""
         self.state = self.batch.state
         picture = self.batch.ports.picture if self.batch.more else self.state.image
-        self.image, self.tokens = in_bytes(picture, self.channels), self.state.tokens
+        self.image = in_bytes(picture, self.channels)
+        self.tokens = self.state.tokens.reshape(self.players, -1)
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what looks into the memory of the batch."""
@@ -234,21 +281,26 @@ class Table(Copied):
             self._begin(chosen & (rows == 0))
 
     def step(self, task: Task, actions: Any) -> int:
-        """Step all rows, int64 (E, 3 + slots); how many episodes ended. Raises ValueError for a bad action."""
+        """Step all rows, int64 (E S, 3 + slots); how many episodes ended. Raises ValueError for a bad action."""
         self.look("step")
-        try:
-            given = np.asarray(actions)
-        except ValueError:  # rows of different lengths
-            given = np.array(None)
-        expected = self.batch.ports.actions.shape
-        if given.shape != expected or given.dtype.kind not in "iu":
-            raise ValueError(
-                f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers {expected}"
-            )
+        given = self.own_actions(actions, self.players)
         ended = self.play(task, given)
         if ended == BAD_ACTION:
             raise self.refusal(given)
         return ended
+
+    def own_actions(self, actions: Any, count: int) -> NDArray[np.integer[Any]]:
+        """Actions of a number of players, integers (count, 3 + slots). Raises ValueError for anything else."""
+        try:
+            given = np.asarray(actions)
+        except ValueError:  # rows of different lengths
+            given = np.array(None)
+        expected = count, self.batch.ports.actions.shape[1]
+        if given.shape != expected or given.dtype.kind not in "iu":
+            raise ValueError(
+                f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers {expected}"
+            )
+        return given
 
     def refusal(self, actions: NDArray[np.integer[Any]]) -> ValueError:
         """Why a step did nothing: one of the actions is outside of the space."""
@@ -359,7 +411,7 @@ class Table(Copied):
         self.batch.set_weights(0, weights)
 
     def scripted_actions(self) -> NDArray[np.int64]:
-        """The actions of the agents' scripts, int64 (E, 3 + slots); nothing changes."""
+        """The actions of the agents' scripts, int64 (E, 3 + slots); nothing changes in the rooms."""
         free = [p.name for p in self.programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
         if free:
             names = ", ".join(dict.fromkeys(free))
@@ -368,7 +420,7 @@ class Table(Copied):
             )
         self.look("the script")
         self.batch.script()
-        actions = self.batch.ports.actions.copy()
+        actions = self.batch.ports.actions[:: self.seats].copy()
         lacking = np.flatnonzero(actions[:, 0] < 0)
         if len(lacking):
             program = self.programs[self.number(int(lacking[0]))]
@@ -377,6 +429,52 @@ class Table(Copied):
                 f"{', '.join(program.actions)}"
             )
         return actions
+
+    def scripts_of_all(self) -> NDArray[np.int64]:
+        """The actions of the scripts on all seats, int64 (E S, 3 + slots); nothing changes in the rooms."""
+        for program in self.programs:
+            framed = set(program.table(Header.FRAME_AT)[:, FrameColumn.ENTITY].tolist())
+            lacking = [str(seat) for seat in program.seats[1:] if program.entities.index(seat) not in framed]
+            if lacking:
+                raise ValueError(f"{lacking[0]} of {program.name} follows no frame, so it has no script")
+        found = np.zeros((self.rows, self.seats, self.batch.ports.actions.shape[1]), np.int64)
+        found[:, 0] = self.scripted_actions()
+        played = self.batch.program_numbers()
+        for number, program in enumerate(self.programs):
+            rows = np.flatnonzero(played == number)
+            for seat, row in enumerate(program.seat_table.tolist(), 1):
+                wishes = self.state.registers[rows, row[SeatColumn.FIRST] + SeatRegister.WISH :][:, :2]
+                found[rows, seat] = self._encoded(number, wishes)
+        return found.reshape(self.players, -1)
+
+    def _encoded(self, number: int, wishes: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Bodies and 1 + lines of a program, (N, 2), as actions; what cannot be done or said is left out."""
+        part, program = self.merged.parts[number], self.programs[number]
+        bodies = np.full(len(TURN_WORDS), len(part.actions) - 1)
+        bodies[np.array(part.actions)[::-1]] = np.arange(len(part.actions))[::-1]
+        pairs = np.concatenate([[0], program.pairs_said])[wishes[:, 1]]
+        return np.concatenate([bodies[wishes[:, :1]], self._spoken_pairs[number][pairs]], axis=1)
+
+    @cached_property
+    def _spoken_pairs(self) -> list[NDArray[np.int64]]:
+        """For each program the heads behind the first that say a pair, by 1 + its number; silence is 0."""
+        sentences = self.merged.playable.sentences
+        found = []
+        for program, part in zip(self.programs, self.merged.parts, strict=True):
+            fillings = program.header(Header.NOUNS)
+            table = np.zeros(
+                (1 + program.header(Header.TEMPLATES) * fillings, 2 + len(sentences.slots)), np.int64
+            )
+            for template, choices in sentences.each():
+                base, *strides = part.strides[template]
+                words = [own[choice] for own, choice in zip(part.slots, choices, strict=True)]
+                if part.templates[template] >= 0 and all(
+                    word >= 0 for word, stride in zip(words, strides, strict=True) if stride
+                ):
+                    filling = base + sum(s * w for s, w in zip(strides, words, strict=True) if s)
+                    table[1 + part.templates[template] * fillings + filling] = 1, template, *choices
+            found.append(table)
+        return found
 
     # --- looking ---
 
@@ -417,15 +515,32 @@ class Table(Copied):
         members = self._called[pool]
         return None if members is None else members[self.number(row) - self.merged.pools[pool][0]]
 
-    def heard(self, row: int) -> list[str]:
-        """Lines heard in the last step."""
+    def heard(self, player: int) -> list[str]:
+        """Lines that a player heard in the last step."""
+        row, seat = divmod(player, self.seats)
         program, registers = self.program(row), self.state.registers[row]
-        first = program.header(Header.HEARD)
-        return [program.lines[line] for line in registers[first : first + int(registers[Register.HEARD])]]
+        count, first = heard_at(program, seat)
+        return [program.lines[line] for line in registers[first : first + int(registers[count])]]
 
-    def history(self, row: int) -> list[str]:
-        """Lines heard since the reset, as far as they are kept."""
-        return history(self.program(row), self.state.registers[row])
+    def history(self, player: int) -> list[str]:
+        """Lines that a player heard since the reset, as far as they are kept."""
+        row, seat = divmod(player, self.seats)
+        return history(self.program(row), self.state.registers[row], seat)
+
+    def set_taken(self, taken: NDArray[np.bool_]) -> None:
+        """Say on which seats players sit from the next step on, bool (E S,).
+
+        Raises:
+            ValueError: they are not that many truth values, or an agent's seat would be empty.
+        """
+        given = np.asarray(taken)
+        if given.shape != (self.players,) or given.dtype != np.bool_:
+            raise ValueError(
+                f"taken: got {given.dtype} of shape {given.shape}; expected {self.players} booleans"
+            )
+        if not given[:: self.seats].all():
+            raise ValueError("taken: got False for an agent's seat, which is always taken; expected True")
+        self.batch.ports.taken[:] = given
 
     def describe(self, row: int) -> dict[str, Any]:
         """The state of a row in the scenario's own names; a superset of a layout."""
@@ -454,11 +569,11 @@ class Table(Copied):
     # --- numbers for a learner ---
 
     def utterance_ids(self) -> NDArray[np.int64]:
-        """A number for what was heard in the last step, int64 (E,); 0 for silence."""
-        ids = np.zeros(self.rows, np.uint64)
-        for number, k, rows, said in self._spoken():
+        """A number for what each player heard in the last step, int64 (E S,); 0 for silence."""
+        ids = np.zeros(self.players, np.uint64)
+        for number, k, players, said in self._spoken():
             lines = self._texts[number][said] + np.uint64(1)
-            ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
+            ids[players] = (ids[players] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
         return ids.view(np.int64)
 
     @cached_property
@@ -479,35 +594,37 @@ class Table(Copied):
         ]
 
     def heard_lines(self) -> HeardLines:
-        """Who said what in the last step, as far as the agent heard it."""
+        """Who said what in the last step, as far as each player heard it."""
         most = max(program.header(Header.HEARD_SIZE) for program in self.programs)
-        speakers, lines = (np.full((self.rows, most), -1, np.int64) for _ in range(2))
-        for number, k, rows, said in self._spoken():
+        speakers, lines = (np.full((self.players, most), -1, np.int64) for _ in range(2))
+        for number, k, players, said in self._spoken():
             speaker_of, text_of = self._line_parts[number]
-            speakers[rows, k], lines[rows, k] = speaker_of[said], text_of[said]
+            speakers[players, k], lines[players, k] = speaker_of[said], text_of[said]
         return HeardLines(speakers, lines)
 
     def _spoken(self) -> Iterator[tuple[int, int, NDArray[np.int64], NDArray[np.int32]]]:
-        """The lines heard in the last step: program, position, the rows with a line there, its number in each row."""
+        """The lines heard in the last step: program, position, the players who heard one there, its number for each."""
         registers, played = self.state.registers, self.batch.program_numbers()
-        heard = registers[:, Register.HEARD]
         for number, program in enumerate(self.programs):
-            first = program.header(Header.HEARD)
-            for k in range(program.header(Header.HEARD_SIZE)):
-                rows = np.flatnonzero((played == number) & (heard > k))
-                yield number, k, rows, registers[rows, first + k]
+            rows = np.flatnonzero(played == number)
+            for seat in range(self.seats):
+                count, first = heard_at(program, seat)
+                for k in range(program.header(Header.HEARD_SIZE)):
+                    those = rows[registers[rows, count] > k]
+                    yield number, k, those * self.seats + seat, registers[those, first + k]
 
     def history_ids(self) -> NDArray[np.int64]:
-        """A number for all that was heard since the reset, int64 (E,); 0 for nothing."""
-        ids = self.state.keys[:, Key.DIGEST].copy()
+        """A number for all that each player heard since the reset, int64 (E S,); 0 for nothing."""
+        of_seats = [Key.DIGEST, *range(Key.WORDS, Key.WORDS + self.seats - 1)]
+        ids = self.state.keys[:, of_seats]
         if len(self.programs) > 1:
             # Lines are numbered by program, so equal numbers of two programs may be different texts.
             marks = np.array([mix(number * GOLDEN) & MASK for number in range(len(self.programs))], np.uint64)
-            ids[ids != 0] ^= marks[self.batch.program_numbers()][ids != 0]
-        return ids.view(np.int64)
+            ids = np.where(ids != 0, ids ^ marks[self.batch.program_numbers()][:, None], ids)
+        return ids.reshape(-1).view(np.int64)
 
     def image_ids(self) -> NDArray[np.int64]:
-        """A number for the picture, int64 (E,)."""
+        """A number for the picture of each player, int64 (E S,)."""
         return self.batch.identify()
 
     def counters(self) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -12,12 +12,20 @@ from numpy.typing import NDArray
 
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.engine.calls import Task
+from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import frame
+from socialai_dsl.envs.seats import Company, Seating, Seats
 from socialai_dsl.envs.table import HeardLines, Table, joined
+from socialai_dsl.envs.values import whole_number
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable
+
+
+def _is_agents(seating: Seating) -> bool:
+    return isinstance(seating, str) and seating == "agent"
+
 
 _TASKS = {
     AutoresetMode.NEXT_STEP: Task.STEP_NEXT,
@@ -27,6 +35,7 @@ _TASKS = {
 _MODES = {mode.value.lower(): mode for mode in AutoresetMode}
 
 Observation = dict[str, NDArray[Any]]
+AGENT: Final = "agent"
 
 
 class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
@@ -57,6 +66,17 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         copy: False returns the engine's own buffers, also in infos. They are valid until the next call, which writes
             only what changed.
         render_mode: `rgb_array` or `ansi`; `render()` then returns one picture for each environment.
+        seats: `agent`: actions are those of the agents, and other members of the cast with a seat follow their frames.
+            `all`: each of the `num_envs` games has a row for each of its S seats, one behind the other, so that there
+            are E = `num_envs` S rows with an observation, an action, a reward and a success each; `seat` says which.
+            An episode begins and ends in all rows of a game at once; seeds and options of `reset` are those of games.
+            A mapping, `{"helper": "script"}`: who fills the seats of members of the cast: `script`, its frame (a
+            member without one stays); `random`; or a policy with `reset(mask)` and `act(observation)`. Actions are
+            those of the first seat that it does not name, and all others follow their frames.
+
+    Attributes:
+        seat: int64 (E,), the number of the seat that a row plays, 0 the agent's.
+        num_games: how many games are played.
 
     Raises:
         ValueError: an argument is not what was expected.
@@ -70,6 +90,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         autoreset_mode: str | AutoresetMode = "NextStep",
         copy: bool = True,
         render_mode: str | None = None,
+        seats: Seating = "agent",
     ) -> None:
         if not playables:
             raise ValueError("scenarios: got none; expected at least one")
@@ -98,9 +119,14 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             "render_fps": 4,
         }
         self._task = _TASKS[self.autoreset_mode]
-        self._table = Table(playables, int(num_envs))
+        self._table = Table(playables, int(num_envs), all_seats=not _is_agents(seats))
+        self._seats = Seats.of(seats, self._table.programs)
+        self._own = self._seats.rows
+        self._company = Company(self._seats, self._table) if self._seats.partners else None
         self._copy = copy
-        self.num_envs = int(num_envs)
+        self.num_games = int(num_envs)
+        self.seat = (np.arange(self._table.players) % self._table.seats)[self._own]
+        self.num_envs = len(self.seat)
         self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
         self.single_observation_space = self._table.merged.observation_space()
         self.single_action_space = self._table.merged.action_space()
@@ -156,6 +182,8 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         self._table.reset(seed, options)
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
+        if self._company is not None:
+            self._company.begin(self._table.batch.ports.chosen.copy())
         return self._observation(), {}
 
     def step(
@@ -173,27 +201,42 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         Raises:
             ValueError: there was no reset yet, or an action is outside the space.
         """
-        ended = self._table.step(self._task, actions)
+        ended = self._step(actions)
         ports = self._table.batch.ports
         infos = self._infos() if ended else {}
-        reward, terminated, truncated = ports.reward, ports.terminated, ports.truncated
-        if self._copy:
-            reward, terminated, truncated = reward.copy(), terminated.copy(), truncated.copy()
+        reward = self._given(ports.reward)
+        terminated, truncated = self._for_players(ports.terminated), self._for_players(ports.truncated)
         return self._observation(), reward, terminated, truncated, infos
 
+    def _step(self, actions: NDArray[np.int64]) -> int:
+        """Step all games; how many episodes ended."""
+        if self._company is None:
+            return self._table.step(self._task, actions)
+        self._table.look("step")
+        own = self._table.own_actions(actions, self.num_envs)
+        before = self._table.state.keys[:, Key.EPISODE].copy()
+        ended = self._table.step(self._task, self._company.act(own))
+        self._company.begin(self._table.state.keys[:, Key.EPISODE] != before)
+        return ended
+
     def _observation(self) -> Observation:
-        image, tokens = self._table.image, self._table.tokens
-        return (
-            {"image": image.copy(), "tokens": tokens.copy()}
-            if self._copy
-            else {"image": image, "tokens": tokens}
-        )
+        return {"image": self._given(self._table.image), "tokens": self._given(self._table.tokens)}
+
+    def _given(self, of_players: NDArray[Any]) -> NDArray[Any]:
+        """What belongs to the caller of what each player has."""
+        own = of_players if self._own == slice(None) else of_players[self._own]
+        return own.copy() if self._copy else own
+
+    def _for_players(self, of_games: NDArray[Any]) -> NDArray[Any]:
+        """What is so in each game, for each row."""
+        if self._seats.own is None:
+            return np.repeat(of_games, self._table.seats)
+        return of_games.copy() if self._copy else of_games
 
     def _infos(self) -> dict[str, Any]:
         ports = self._table.batch.ports
-        ended, outcome, success = ports.ended, ports.outcome, ports.success
-        if self._copy:
-            ended, outcome, success = ended.copy(), outcome.copy(), success.copy()
+        ended, outcome = self._for_players(ports.ended), self._for_players(ports.outcome)
+        success = self._given(ports.success)
         infos: dict[str, Any] = {
             "success": success,
             "_success": ended,
@@ -202,7 +245,8 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         }
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             image = joined(ports.final_image, ports.final_extra, self._table.channels)
-            final: Observation = {"image": image, "tokens": ports.final_tokens}
+            tokens = ports.final_tokens.reshape(self._table.players, -1)
+            final: Observation = {"image": image[self._own], "tokens": tokens[self._own]}
             infos["final_info"], infos["_final_info"] = dict(infos), ended
             infos["final_obs"] = {k: v.copy() for k, v in final.items()} if self._copy else final
             infos["_final_obs"] = ended
@@ -212,19 +256,24 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
 
     def utterances(self) -> list[str]:
         """What each environment's agent heard in the last step: one line for each speaker, "NA" in silence."""
-        return ["\n".join(self._table.heard(row)) or "NA" for row in range(self.num_envs)]
+        return ["\n".join(self._table.heard(player)) or "NA" for player in self._players]
 
     def histories(self) -> list[str]:
         """What each environment's agent heard since the reset: the lines that the token buffer still holds."""
-        return ["\n".join(self._table.history(row)) for row in range(self.num_envs)]
+        return ["\n".join(self._table.history(player)) for player in self._players]
+
+    @property
+    def _players(self) -> range:
+        """The caller's, by number."""
+        return range(self._table.players)[self._own]
 
     def members(self) -> list[str | None]:
         """The name of the suite's member that each environment plays in this episode; None without a suite."""
-        return [self._table.member(row) for row in range(self.num_envs)]
+        return [self._table.member(player // self._table.seats) for player in self._players]
 
     def member_ids(self) -> NDArray[np.int64]:
         """The index into `program.members` of what each environment plays now, int64 (E,); 0 without a suite."""
-        return self._table.batch.program_numbers().astype(np.int64)
+        return self._for_players(self._table.batch.program_numbers().astype(np.int64))
 
     def set_member_weights(self, weights: Sequence[int]) -> None:
         """Draw the members of the suite, or the leaves of its tree, in proportion to these weights in later episodes.
@@ -239,13 +288,31 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
 
     def describe(self, index: int) -> dict[str, Any]:
         """The state of environment `index` in the scenario's own names, as a layout that `reset` accepts."""
-        return self._table.describe(index)
+        player = whole_number("index", index, 0, self.num_envs - 1)
+        return self._table.describe(self._players[player] // self._table.seats)
+
+    def set_taken(self, taken: NDArray[np.bool_]) -> None:
+        """Say on which seats players sit from the next step on, over resets; at first on all. For `seats="all"`.
+
+        While nobody sits on a seat its member follows its frame, or stays, and its actions count for nothing.
+
+        Args:
+            taken: bool (E,); an agent's seat is always taken.
+
+        Raises:
+            ValueError: it is something else, or not all seats are the caller's.
+        """
+        if self._seats.own is not None:
+            raise ValueError(
+                f"set_taken: got a call for {self._seats.names[self._seats.own]} alone; expected seats='all'"
+            )
+        self._table.set_taken(taken)
 
     # --- numbers for a learner ---
 
     def utterance_ids(self) -> NDArray[np.int64]:
         """An id of what was heard in the last step, int64 (E,): equal for equal texts, 0 for silence."""
-        return self._table.utterance_ids()
+        return self._table.utterance_ids()[self._own]
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -260,23 +327,40 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             `lines`, int64 (E, K): indices into `lines`. Both in the order spoken, -1 behind the last; K is the most
             that can be heard in one step. In same-step mode, a step that ends an episode leaves nothing heard.
         """
-        return self._table.heard_lines()
+        heard = self._table.heard_lines()
+        return HeardLines(heard.speakers[self._own], heard.lines[self._own])
 
     def history_ids(self) -> NDArray[np.int64]:
         """An id of all that was heard since the reset, int64 (E,): equal for equal histories, 0 for none."""
-        return self._table.history_ids()
+        return self._table.history_ids()[self._own]
 
     def image_ids(self) -> NDArray[np.int64]:
         """An id of the picture, int64 (E,): equal for equal pictures."""
-        return self._table.image_ids()
+        return self._table.image_ids()[self._own]
 
-    def scripted_actions(self) -> NDArray[np.int64]:
-        """The actions of the scenario's own script for the agent, int64 (E, 3 + slots); nothing changes.
+    @property
+    def seat_names(self) -> tuple[str, ...]:
+        """The members of the cast that the caller plays, in the order of the rows of a game."""
+        names = self._seats.names
+        return names if self._seats.own is None else (names[self._seats.own],)
+
+    def scripted_actions(self, seat: str | None = None) -> NDArray[np.int64]:
+        """The actions of the scenario's own scripts for the members that are played, int64 (E, 3 + slots).
+
+        The agent's is what its frame would do now; that of another member what its frame chose in its last turn, while
+        a player had its body and voice. Nothing changes.
+
+        Args:
+            seat: `agent`, with all seats: the agent's alone, int64 (games, 3 + slots).
 
         Raises:
-            ValueError: the agent of a scenario follows no frame.
+            ValueError: one of the members follows no frame.
         """
-        return self._table.scripted_actions()
+        if seat == AGENT or (seat is None and self._seats.own == 0):
+            return self._table.scripted_actions()
+        if seat is not None:
+            raise ValueError(f"seat: got {seat!r}; expected {AGENT!r} or none")
+        return self._table.scripts_of_all()[self._own]
 
     def counters(self) -> dict[str, Any]:
         """Counts since the environments were made.
@@ -320,7 +404,9 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         if self.render_mode is None:
             return None
         self._table.look("render")
-        return tuple(frame(self._table, row, self.render_mode) for row in range(self.num_envs))
+        return tuple(
+            frame(self._table, player // self._table.seats, self.render_mode) for player in self._players
+        )
 
     def set_attr(self, name: str, values: Mapping[str, Any] | Any) -> None:
         """Environments of a batch have no attributes of their own."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
 import gymnasium
@@ -20,7 +20,7 @@ Int64 = NDArray[np.int64]
 Seat = str
 
 AGENT: Final[Seat] = "agent"
-"""The one seat that scenarios have."""
+"""The seat that every scenario has, the first of several."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,12 @@ class Step:
         numbers: int64 (E,), the number of the episode in each room.
         running: bool (E,), the rooms in which an episode went on before this step; the others count for nothing.
         actions: of each seat, int64 (E, heads).
-        reward: float64 (E,).
+        reward: float64 (E,), of the first seat.
         ended: bool (E,), the rooms whose episode ended in this step, by an outcome or by the horizon.
-        success: bool (E,). outcome: int64 (E,), an index into the outcomes of what is played. Both count where `ended`.
+        success: bool (E,), of the first seat. outcome: int64 (E,), an index into the outcomes of what is played. Both
+            count where `ended`.
         info: what the environment returned.
+        others: of each other seat its reward, float64 (E,), and success, bool (E,).
     """
 
     numbers: Int64
@@ -45,6 +47,7 @@ class Step:
     success: Bools
     outcome: Int64
     info: Mapping[str, Any]
+    others: Mapping[Seat, tuple[NDArray[np.float64], Bools]] = field(default_factory=dict)
 
 
 class Observer:
@@ -69,6 +72,7 @@ class Rooms:
 
     Attributes:
         env: the environment itself, without wrappers.
+        seats: the seats of a room: of a vector environment with all seats those, else the agent's.
         count: E; 1 of a single environment.
         observations: of each seat, arrays of E.
         info: what the environment returned last.
@@ -86,16 +90,13 @@ class Rooms:
             mode = self.env.metadata.get("autoreset_mode")
             if mode is not gymnasium.vector.AutoresetMode.DISABLED:
                 raise ValueError(f"envs: got the auto-reset mode {mode}, expected Disabled")
-        self.count = int(self.env.num_envs) if self._many else 1
+        named = getattr(self.env, "seat_names", (AGENT,)) if self._many else (AGENT,)
+        self.seats: tuple[Seat, ...] = tuple(named) if len(named) > 1 else (AGENT,)
+        self.count = int(self.env.num_envs) // len(self.seats) if self._many else 1
         self.observers = tuple(observers)
         self.observations: dict[Seat, Observation] = {}
         self.info: Mapping[str, Any] = {}
         self.numbers, self.running = np.full(self.count, -1), np.zeros(self.count, np.bool_)
-
-    @property
-    def seats(self) -> tuple[Seat, ...]:
-        """The seats of a room."""
-        return (AGENT,)
 
     @property
     def action_sizes(self) -> tuple[int, ...]:
@@ -162,13 +163,21 @@ class Rooms:
         return found.astype(np.int64, copy=False)
 
     def _step_many(self, actions: Mapping[Seat, Int64]) -> Step:
-        observation, reward, terminated, truncated, infos = self.env.step(actions[AGENT])
+        count = len(self.seats)
+        together = np.stack([actions[seat] for seat in self.seats], axis=1).reshape(self.count * count, -1)
+        observation, reward, terminated, truncated, infos = self.env.step(together)
         self.info = infos
         self._see(observation)
-        ended = self.running & (terminated | truncated)
-        none = np.zeros(self.count, np.int64)
-        success, outcome = infos.get("success", none.astype(np.bool_)), infos.get("outcome", none)
-        return Step(self.numbers, self.running, actions, reward, ended, success, outcome, infos)
+        ended = self.running & (terminated | truncated)[::count]
+        none = np.zeros(self.count * count, np.int64)
+        success, outcome = infos.get("success", none.astype(np.bool_)), infos.get("outcome", none)[::count]
+        others = {
+            seat: (reward[number::count], success[number::count])
+            for number, seat in enumerate(self.seats)
+            if number
+        }
+        own = reward[::count], ended, success[::count], outcome
+        return Step(self.numbers, self.running, actions, *own, infos, others)
 
     def _step_one(self, actions: Mapping[Seat, Int64]) -> Step:
         observation, reward, terminated, truncated, info = self.env.step(actions[AGENT][0])
@@ -189,7 +198,10 @@ class Rooms:
 
     def _see(self, observation: Observation) -> None:
         whole = observation if self._many else {name: value[None] for name, value in observation.items()}
-        self.observations = {AGENT: whole}
+        self.observations = {
+            seat: {name: value[number :: len(self.seats)] for name, value in whole.items()}
+            for number, seat in enumerate(self.seats)
+        }
 
 
 class Agenda(Protocol):

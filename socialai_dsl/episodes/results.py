@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
+from socialai_dsl.episodes.play import Observer, Rooms, Step
 
 # The two-sided 95 % quantile of the normal distribution.
 _Z = 1.959963984540054
@@ -47,6 +47,7 @@ class EvalResult:
         returns: float64 (N,), the undiscounted sum of rewards.
         names: the scenario's outcomes.
         rules: mean number of times that each rule of the scenario fired in an episode.
+        others: of each seat but the first whether an episode was its success, bool (N,), and its return, float64 (N,).
     """
 
     success: NDArray[np.bool_]
@@ -55,6 +56,7 @@ class EvalResult:
     returns: NDArray[np.float64]
     names: tuple[str, ...]
     rules: Mapping[str, float] = field(default_factory=dict)
+    others: Mapping[str, tuple[NDArray[np.bool_], NDArray[np.float64]]] = field(default_factory=dict)
 
     @property
     def episodes(self) -> int:
@@ -113,6 +115,7 @@ class Results(Observer):
         self._names = tuple(names)
         self._success, self._outcome = np.zeros(episodes, np.bool_), np.full(episodes, -1)
         self._lengths, self._returns = np.zeros(episodes, np.int64), np.zeros(episodes)
+        self._others: dict[str, tuple[NDArray[np.bool_], NDArray[np.float64]]] = {}
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
@@ -123,6 +126,11 @@ class Results(Observer):
             numbers = step.numbers[step.ended]
             self._success[numbers] = step.success[step.ended]
             self._outcome[numbers] = step.outcome[step.ended]
+        for seat, (reward, success) in step.others.items():
+            count = len(self._outcome)
+            won, returns = self._others.setdefault(seat, (np.zeros(count, np.bool_), np.zeros(count)))
+            returns[step.numbers[step.running]] += reward[step.running]
+            won[step.numbers[step.ended]] = success[step.ended]
 
     def result(self, rules: Mapping[str, float] | None = None) -> EvalResult:
         """The results of all N episodes, with the mean number of times that each rule fired.
@@ -137,7 +145,7 @@ class Results(Observer):
                 "an action in every step"
             )
         return EvalResult(
-            self._success, self._outcome, self._lengths, self._returns, self._names, rules or {}
+            self._success, self._outcome, self._lengths, self._returns, self._names, rules or {}, self._others
         )
 
 
@@ -145,7 +153,7 @@ class Actions(Observer):
     """Keeps the actions, so that an episode can be played again to be filmed or traced.
 
     Attributes:
-        played: number of an episode -> its actions, int64 (heads,) each.
+        played: number of an episode -> its actions, int64 (heads,) each, of several seats (S, heads).
     """
 
     def __init__(self) -> None:
@@ -153,6 +161,9 @@ class Actions(Observer):
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
-        numbers, actions = step.numbers.tolist(), step.actions[AGENT].copy()
+        numbers = step.numbers.tolist()
+        actions = np.stack([step.actions[seat] for seat in rooms.seats], axis=1)
+        if len(rooms.seats) == 1:
+            actions = actions[:, 0]
         for room in np.flatnonzero(step.running).tolist():
             self.played.setdefault(numbers[room], []).append(actions[room])

@@ -19,7 +19,7 @@ from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy, require_trainer
-from socialai_dsl.episodes.policies import Policy
+from socialai_dsl.episodes.policies import Policy, replayed_seats
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
@@ -28,7 +28,7 @@ from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_mo
 from socialai_dsl.evaluation.people import play_test_episodes
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
-from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
+from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed, seats_of
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
@@ -96,6 +96,10 @@ class Evaluation:
         }
         if self.trials > 1:
             figures["trials"] = [_some_of(*counts) for counts in result.by_trial(self.trials)]
+        if result.others:
+            figures["seats"] = {
+                seat: _some_of(int(won.sum()), len(won)) for seat, (won, _) in result.others.items()
+            }
         figures |= {**_by_member(self.program, shares), **self.more}
         for (draw, value), numbers in of_test_episodes(self.loaded, self.program, result.episodes).items():
             won = int(result.success[numbers].sum())
@@ -126,12 +130,13 @@ class Evaluation:
             number: of the test episode.
             label: how the recording calls the agent.
         """
-        env = make(self.program, render_mode="rgb_array")
+        partners, own = replayed_seats(seats_of(self.program), self.actions[number])
+        env = make(self.program, render_mode="rgb_array", seats=partners)
         title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
             reset = {"options": {"test_episode": number}}
-            return film(env, self.actions[number], reset, title, endings)
+            return film(env, own, reset, title, endings)
         finally:
             env.close()
 
@@ -173,29 +178,32 @@ class _Played:
         cut_short: Mapping[int, str] = MappingProxyType({}),
     ) -> list[Trace]:
         """See `Evaluation.traces`; `cut_short` has the endings of the episodes that no step ended."""
-        env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded))
-        try:
-            # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
-            thinks = self.player.is_trained and self.trials == 1
-            policy = make_policy(self.player, env)[0] if thinks else None
-            return [
-                trace_of(
-                    env,
-                    self.actions[number],
-                    {"options": {"test_episode": number}},
-                    scenario=self.scenario,
-                    agent=self.player.agent,
-                    episode=f"test episode {number}",
-                    endings=self.texts,
-                    about=about_of(self.loaded),
-                    think=None if policy is None else _thinking(policy, number),
-                    replies=replies.get(number, ()),
-                    cut_short=self._outcome(cut_short.get(number)),
+        # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
+        thinks = self.player.is_trained and self.trials == 1
+        found = []
+        for number in numbers:
+            partners, own = replayed_seats(seats_of(self.program), self.actions[number])
+            env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded), seats=partners)
+            try:
+                policy = make_policy(self.player, env)[0] if thinks else None
+                found.append(
+                    trace_of(
+                        env,
+                        own,
+                        {"options": {"test_episode": number}},
+                        scenario=self.scenario,
+                        agent=self.player.agent,
+                        episode=f"test episode {number}",
+                        endings=self.texts,
+                        about=about_of(self.loaded),
+                        think=None if policy is None else _thinking(policy, number),
+                        replies=replies.get(number, ()),
+                        cut_short=self._outcome(cut_short.get(number)),
+                    )
                 )
-                for number in numbers
-            ]
-        finally:
-            env.close()
+            finally:
+                env.close()
+        return found
 
     def _outcome(self, ending: str | None) -> Outcome | None:
         return None if ending is None else Outcome(name=ending, success=False, text=self.texts[ending])
@@ -248,8 +256,8 @@ def play_test_set(
         )
         return replace(_of_model(played, scenario, loaded, program, player, briefing), trials=trials)
     kept = Actions()
-    with _seated(player, scenario, loaded, program, episodes // trials) as (envs, policy, told):
-        result = evaluate_policy(policy, envs, episodes, [kept], trials)
+    with _seated(player, scenario, loaded, program, episodes // trials) as (envs, policies, told):
+        result = evaluate_policy(policies, envs, episodes, [kept], trials)
     return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told, trials=trials)
 
 
@@ -277,10 +285,8 @@ def trace_test_episodes(
     """
     sessions = sorted({number - number % trials for number in numbers})
     kept = Actions()
-    with _seated(player, scenario, loaded, program, len(sessions)) as (envs, policy, told):
-        play(
-            Rooms(envs, [kept]), {AGENT: policy}, TestEpisodes(sessions[-1] + trials, trials, iter(sessions))
-        )
+    with _seated(player, scenario, loaded, program, len(sessions)) as (envs, policies, told):
+        play(Rooms(envs, [kept]), policies, TestEpisodes(sessions[-1] + trials, trials, iter(sessions)))
     texts = {one.name: one.text for one in endings_of(loaded, program)}
     played = _Played(scenario, loaded, program, player, kept.played, texts, trials)
     return played.traces(numbers), told
@@ -289,22 +295,34 @@ def trace_test_episodes(
 @contextmanager
 def _seated(
     player: Player, scenario: str, loaded: Loaded, program: Playable, sessions: int
-) -> Iterator[tuple[Any, Policy, list[str]]]:
-    """A vector environment for this number of sessions, at most `_TOGETHER` at once, the policy, and its warnings.
+) -> Iterator[tuple[Any, dict[str, Policy], list[str]]]:
+    """A vector environment for this number of sessions, at most `_TOGETHER` at once, a policy for each seat that is
+    played, and their warnings.
 
     Raises:
         UsageError: the player does not fit the scenario, now or in the block.
     """
     if player.is_trained:
         require_trainer()
+    played = compiled(with_script(scenario, loaded).loaded) if player.is_script else program
+    seats = seats_of(played)
     envs = make_vec(
-        compiled(with_script(scenario, loaded).loaded) if player.is_script else program,
+        played,
         num_envs=min(_TOGETHER, sessions),
         copy=False,
         autoreset_mode="Disabled",
+        # A script plays by itself where nobody sits; whoever learns or draws plays all seats.
+        seats="all" if len(seats) > 1 and not player.is_script else AGENT,
     )
     try:
-        yield envs, *make_policy(player, envs)
+        # What one draws must not tell another anything, so each seat has a seed of its own.
+        seeds = [player.seed + (seat << 40) for seat in range(len(envs.seat_names))]
+        made = [make_policy(replace(player, seed=seed), envs) for seed in seeds]
+        yield (
+            envs,
+            {seat: policy for seat, (policy, _) in zip(envs.seat_names, made, strict=True)},
+            made[0][1],
+        )
     except ValueError as error:
         raise UsageError(f"{scenario}: {error}") from error
     finally:
@@ -346,7 +364,11 @@ def _of_model(
 
 
 def evaluate_policy(
-    policy: Policy, envs: Any, episodes: int = 500, observers: Sequence[Observer] = (), trials: int = 1
+    policy: Policy | Mapping[str, Policy],
+    envs: Any,
+    episodes: int = 500,
+    observers: Sequence[Observer] = (),
+    trials: int = 1,
 ) -> EvalResult:
     """Play test episodes 0 to `episodes - 1`, each exactly once.
 
@@ -354,9 +376,9 @@ def evaluate_policy(
     the policy is told the number of each episode, so the result does not depend on the number of environments.
 
     Args:
-        policy: the player; whether it samples, and with which seed, is its own affair.
+        policy: the player, of several seats one for each; whether it samples, and with which seed, is its own affair.
         envs: a vector environment with `autoreset_mode="Disabled"`, which plays and counts the test episodes alone.
-        episodes: N, at least the number of environments; the common test set has 500.
+        episodes: N, at least the number of games; the common test set has 500.
         observers: watch as well.
         trials: how many episodes in a row the policy remembers; it is reset before each session of that many.
 
@@ -370,7 +392,8 @@ def evaluate_policy(
         raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]
-    play(Rooms(envs, [results, *observers]), {AGENT: policy}, TestEpisodes(episodes, trials))
+    players = policy if isinstance(policy, Mapping) else {AGENT: policy}
+    play(Rooms(envs, [results, *observers]), players, TestEpisodes(episodes, trials))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
 

@@ -132,6 +132,7 @@ class Flag(IntEnum):
     HEARD_BY = (
         256  # an entry of an inbox has three registers: class, speaker, noun (-1 none); else only the class
     )
+    SEATS = 2048  # others than the agent have a seat; behind the header stands the seat table, see SeatColumn
 
 
 class Register(IntEnum):
@@ -238,6 +239,39 @@ class FrameColumn(IntEnum):
     PERCEIVE = 6  # code run at the start of its turn, before `first`: beliefs; 0 none
     DEFERRED = 7  # code run after the body action where a rule of `first` has chosen it: the rest of that rule; 0 none
     COLUMNS = 8
+
+
+class SeatColumn(IntEnum):
+    """Columns of the seat table: one row for each seat but the agent's, in the order of the cast.
+
+    Before the rows stands their number, behind them for each line 1 + the pair of the grammar that says the same, or 0.
+    """
+
+    ENTITY = 0
+    FIRST = 1  # first of its registers, see SeatRegister
+    HEARD = 2  # first register of the lines it heard this step, as at Header.HEARD
+    LOG = 3  # first register of its log, as at Header.LOG
+    SAYS = 4  # code that says the line of SeatRegister.UTTERANCE
+    SAID = 5  # register of what its member said in this step; 0: nobody asks
+    COLUMNS = 6
+
+
+class SeatRegister(IntEnum):
+    """Registers of a seat other than the agent's, whose own are among `Register`."""
+
+    TAKEN = 0  # 1: a player sits there in this step
+    ACTION = 1  # Body of the player in this step
+    UTTERANCE = 2  # 1 + pair of the player in this step, 0 silent
+    LINE = 3  # 1 + line that it says in this step, 0 none
+    HEARD = 4  # as Register.HEARD, LOGGED, TOKENS and OLDEST
+    LOGGED = 5
+    TOKENS = 6
+    OLDEST = 7
+    SHARE = 8  # as Register.PERCENT and BONUS
+    BONUS = 9
+    WISH = 10  # Body that its member's frame chose in its last turn, while a player sat there
+    WISH_LINE = 11  # 1 + line that the frame chose to say, 0 none
+    COUNT = 12
 
 
 MOST_CHOICES = 7

@@ -27,6 +27,7 @@ from socialai_dsl.program.format import (
     Header,
     LineColumn,
     Register,
+    SeatColumn,
     TypeColumn,
     constant_of,
 )
@@ -91,11 +92,15 @@ class RegisterName:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One way an episode ends: `name` is the outcome's id, else `success@46` (line of the file)."""
+    """One way an episode ends: `name` is the outcome's id, else `success@46` (line of the file).
+
+    `seats`: whose success it is, by number; None: that of all.
+    """
 
     name: str
     success: bool
     span: Span | None = None
+    seats: tuple[int, ...] | None = None
 
 
 def room_words(width: int, height: int) -> int:
@@ -181,7 +186,28 @@ class Program:
                 digest.update("\x1f".join((slot.name, *slot.words)).encode())
         for name, words in self.looks:
             digest.update("\x1f".join((name, *words)).encode())
+        for outcome in self.outcome_table:
+            if outcome.seats is not None:
+                digest.update(f"{outcome.name} {outcome.seats}".encode())
         return digest.hexdigest()
+
+    @property
+    def seat_table(self) -> npt.NDArray[np.int32]:
+        """The seats but the agent's, int32 (seats, SeatColumn.COLUMNS)."""
+        count = int(self.words[Header.END]) if self.header(Header.FLAGS) & Flag.SEATS else 0
+        start, columns = Header.END + 1, int(SeatColumn.COLUMNS)
+        return self.words[start : start + count * columns].reshape(count, columns)
+
+    @property
+    def seats(self) -> tuple[EntityName, ...]:
+        """The members of the cast that have a seat, the agent first."""
+        return (self.entities[0], *(self.entities[row[SeatColumn.ENTITY]] for row in self.seat_table))
+
+    @property
+    def pairs_said(self) -> npt.NDArray[np.int32]:
+        """For each line 1 + the pair of the grammar that says the same, else 0; where there are several seats."""
+        start = Header.END + 1 + self.seat_table.size
+        return self.words[start : start + self.header(Header.LINES)]
 
     @property
     def channels(self) -> tuple[str, ...]:

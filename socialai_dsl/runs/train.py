@@ -17,12 +17,13 @@ from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled, make_vec
+from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.episodes.players import Player, folder_of, named_agent, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, RunFailed, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.frontend import load
-from socialai_dsl.program_suite import Playable
+from socialai_dsl.program_suite import Playable, seats_of
 from socialai_dsl.runs.copies import keep_run
 from socialai_dsl.runs.evaluate import result_of
 from socialai_dsl.runs.folder import (
@@ -247,7 +248,7 @@ def _train(
 
     played = _played(config, loaded)
     scenario = program if played is loaded else compiled(played)
-    envs = make_vec(scenario, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
+    envs = _environments(scenario, config)
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
 
@@ -273,6 +274,26 @@ def _train(
         raise
     finally:
         envs.close()
+
+
+def _environments(scenario: Playable, config: RunConfig) -> ScenarioVectorEnv:
+    """As many rows as the run asks for; where several seats can be played, each game has a row for each of them.
+
+    Raises:
+        UsageError: the rows cannot be shared out among the games.
+    """
+    seats = seats_of(scenario)
+    if config.envs % len(seats):
+        raise OptionError(
+            "envs", f"got {config.envs}, expected a multiple of the {len(seats)} seats: {', '.join(seats)}"
+        )
+    return make_vec(
+        scenario,
+        num_envs=config.envs // len(seats),
+        copy=False,
+        autoreset_mode="SameStep",
+        seats="all" if len(seats) > 1 else "agent",
+    )
 
 
 def _played(config: RunConfig, loaded: Loaded) -> Loaded:

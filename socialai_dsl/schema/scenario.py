@@ -193,6 +193,24 @@ class Effects(Model):
     to: Expression | None = Field(None, description="the member who is addressed", examples=["speaker"])
 
 
+MemberName = Annotated[
+    str,
+    StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40),
+    Holds("name", ("cast",)),
+]
+"""A member of the cast; those of a group are numbered from 0: `peers[0]`."""
+
+Names = Annotated[
+    ListOf[MemberName],
+    Field(min_length=1),
+    BeforeValidator(
+        _one_or_many,
+        json_schema_input_type=MemberName | Annotated[tuple[MemberName, ...], Field(min_length=1)],
+    ),
+]
+"""One member or group of the cast, or a list of them."""
+
+
 class Rule(Effects):
     """Conditions, all of which must hold, and effects."""
 
@@ -212,6 +230,9 @@ class Rule(Effects):
     once: bool = Field(False, description="once per episode and NPC")
 
 
+_PerCent = Annotated[int, Field(ge=-100, le=100)]
+
+
 class WorldRule(Model):
     """A rule about the world, read once a step after all turns; each that holds takes effect."""
 
@@ -221,8 +242,10 @@ class WorldRule(Model):
     once: bool = Field(False, description="once per episode")
     set: dict[Target, Expression] = Field(default_factory=dict, description="registers of `state`")
     cause: Effect = Field((), description="effects on objects and NPCs, in order")
-    reward: int = Field(
-        0, ge=-100, le=100, description="per cent of the success reward, added to the reward of the step"
+    reward: _PerCent | dict[MemberName, _PerCent] = Field(
+        0,
+        description="per cent of the success reward, added to the reward of the step; or for each seat, by member",
+        examples=[{"agent": 5, "helper": -5}],
     )
 
 
@@ -437,6 +460,9 @@ class CastMember(Character):
     """
 
     role: RoleName | None = Field(None, description="the part it plays")
+    seat: Literal["open"] | None = Field(
+        None, description="open: a player outside of the file can play it; the agent always has a seat"
+    )
     one_of: Annotated[
         tuple[Npc, ...] | None,
         BeforeValidator(_as_tuple),
@@ -624,24 +650,6 @@ class UtteranceGrammar(Model):
 # -- claims and probes, which playing never reads ------------------------------------------------------------
 
 
-MemberName = Annotated[
-    str,
-    StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40),
-    Holds("name", ("cast",)),
-]
-"""A member of the cast; those of a group are numbered from 0: `peers[0]`."""
-
-Names = Annotated[
-    ListOf[MemberName],
-    Field(min_length=1),
-    BeforeValidator(
-        _one_or_many,
-        json_schema_input_type=MemberName | Annotated[tuple[MemberName, ...], Field(min_length=1)],
-    ),
-]
-"""One member or group of the cast, or a list of them."""
-
-
 LetNames = Annotated[
     ListOf[LetName],
     Field(min_length=1),
@@ -786,8 +794,16 @@ class Outcome(Model):
         None, description="a condition that ends the episode well", examples=["agent.at(exit)"]
     )
     failure: Expression | None = Field(None, description="a condition that ends the episode badly")
-    reward: Annotated[Expression, Hides(False)] = Field(
-        100, description="per cent of the success reward; computed when it ends"
+    reward: Annotated[Expression | dict[MemberName, Expression], Hides(False)] = Field(
+        100,
+        description="per cent of the success reward, computed when it ends; or for each seat, by member",
+        examples=[{"agent": 100, "helper": 40}],
+    )
+    for_: Names = Field(
+        (),
+        alias="for",
+        description="whose success it is, of several seats; default: that of all",
+        examples=["helper"],
     )
     id: Word | None = Field(None, description="names the outcome in figures, `check` and patches")
 

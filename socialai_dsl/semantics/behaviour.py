@@ -13,7 +13,7 @@ from socialai_dsl.grammar.ast import parse_expression
 from socialai_dsl.schema.annotations import conditions_of, keys_of
 from socialai_dsl.schema.holds import Means
 from socialai_dsl.schema.scenario import DOES, Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import abilities, addressing, groups, rows, texts, those
+from socialai_dsl.semantics import abilities, addressing, groups, rows, seats, texts, those
 from socialai_dsl.semantics.cast import AGENT
 from socialai_dsl.semantics.nesting import NestedPlanner
 from socialai_dsl.semantics.plans import (
@@ -581,6 +581,7 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
         lambda path, part: step_scope(path, f"{name}.{part}"),
         lambda path, word: _register_of_the_world(resolver, path, word),
     )
+    own, *others = seats.rewards(resolver.symbols, resolver.findings, rule.reward, (*path, "reward"))
     return RulePlan(
         name=rule.id or name,
         site=name,
@@ -589,7 +590,8 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
         chance=rule.chance,
         once=rule.once,
         sets=deeds.sets(rule, path),
-        reward=rule.reward,
+        reward=own,
+        rewards=tuple(others) if any(others) else (),
         causes=deeds.causes(rule, path),
     )
 

@@ -20,9 +20,10 @@ class Mobility:
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
-        # The agent does what it likes.
-        self.turning, self.walking = {0}, {0}
-        self.vanishing: set[int] = set()
+        # Players do what they like, and where there are several one may die while the others go on.
+        players = {0, *checked.seated}
+        self.turning, self.walking = set(players), set(players)
+        self.vanishing: set[int] = set(players) if len(players) > 1 else set()
         self.contents: set[int] = set()
         self.carried: set[int] = set()
         self.pointing = False

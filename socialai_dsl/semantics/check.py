@@ -10,7 +10,7 @@ from typing import Final, get_args
 
 from socialai_dsl import cures
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, advice_on, did_you_mean
-from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
+from socialai_dsl.schema.scenario import CHANNELS, Expression, Outcome, Property, Scenario, Sequence
 from socialai_dsl.semantics import (
     addressing,
     behaviour,
@@ -20,6 +20,7 @@ from socialai_dsl.semantics import (
     object_facts,
     possible,
     rows,
+    seats,
     setup,
     tables,
 )
@@ -401,6 +402,7 @@ class _Run:
         self._findings = findings
         sizes = room_sizes(scenario, findings)
         self._symbols = entities.symbols_of(scenario, prelude, sizes, findings)
+        seats.check_seats(self._symbols, findings)
         self._played = entities.played_frames(self._symbols, findings)
         self.resolver = ScenarioResolver(self._symbols, findings, self._played, words, ranges)
         self._heard: dict[str, dict[DataPath, Line]] | None = None
@@ -416,6 +418,8 @@ class _Run:
             return None
         if not self._grammar_is_whole():
             return None
+        for member in seats.seated(self._symbols)[1:]:
+            resolver.utterances.add_npc_texts(member, resolver.utterances.all_texts())
         entities.declare_registers(resolver)
         if len(resolver.registers) > MAX_REGISTERS:
             own = len(scenario.let) + len(scenario.state)
@@ -499,6 +503,7 @@ class _Run:
             names_shown=scenario.observe.names == "shown",
             addressing=addressing.of_slot(resolver) if scenario.grammar.to is not None else None,
             overheard=scenario.overheard,
+            seated=tuple(self._symbols.numbers[name] for name in seats.seated(self._symbols)[1:]),
             own_voice=scenario.observe.own_voice,
             computed=computed,
             remembered=tuple(resolver.registers.remembered),
@@ -649,12 +654,47 @@ class _Run:
                 condition = self.resolver.sited(getattr(outcome, kind), BOOL, scope)
                 line = findings.places.key_span((*path, kind)).line
                 self.resolver.readings.entries[condition.site] = outcome
-                percent, graded = self._reward(outcome.reward, (*path, "reward"))
-                if kind == "failure" and "reward" in outcome.model_fields_set:
-                    place = findings.places.key_span((*path, "reward"))
-                    findings.error("S107", "a failure earns nothing, so it has no `reward`", place)
+                if kind == "failure":
+                    self._pays_nothing(outcome, path)
                 name = outcome.id or f"{kind}@{line}"
-                yield OutcomePlan(name, kind == "success", percent, condition, graded)
+                meant = self._meant(outcome, path)
+                (percent, graded), *shares = self._shares(outcome.reward, (*path, "reward"), meant)
+                yield OutcomePlan(
+                    name, kind == "success", percent, condition, graded, tuple(shares), meant or None
+                )
+
+    def _pays_nothing(self, outcome: Outcome, path: DataPath) -> None:
+        """Report what only a success has."""
+        places = self._findings.places
+        for key, field, message in (
+            ("reward", "reward", "a failure earns nothing, so it has no `reward`"),
+            ("for", "for_", "a failure is that of all, so it has no `for`"),
+        ):
+            if field in outcome.model_fields_set:
+                self._findings.error("S107", message, places.key_span((*path, key)))
+
+    def _meant(self, outcome: Outcome, path: DataPath) -> tuple[int, ...]:
+        """The seats that a success is for; empty: all."""
+        written = dict(self._findings.each((*path, "for"), outcome.for_))
+        return tuple(sorted({seat for _, seat in seats.numbered(self._symbols, self._findings, written)}))
+
+    def _shares(
+        self, raw: Expression | dict[str, Expression], path: DataPath, meant: tuple[int, ...]
+    ) -> list[tuple[int, SitedTerm | None]]:
+        """Per cent of the success reward for each seat, or what computes it."""
+        count = len(seats.seated(self._symbols))
+        if not isinstance(raw, dict):
+            whole = self._reward(raw, path)
+            return [whole if not meant or seat in meant else (0, None) for seat in range(count)]
+        found: dict[int, tuple[int, SitedTerm | None]] = {}
+        written = {(*path, name): name for name in raw}
+        for place, seat in seats.numbered(self._symbols, self._findings, written):
+            if meant and seat not in meant:
+                message = f"`{place[-1]}` is paid for a success that is not for it"
+                hint = "name it in `for`, or leave it out here"
+                self._findings.error("S107", message, self._findings.places.key_span(place), hint=hint)
+            found[seat] = self._reward(raw[str(place[-1])], place)
+        return [found.get(seat, (0, None)) for seat in range(count)]
 
     def _reward(self, raw: Expression, path: DataPath) -> tuple[int, SitedTerm | None]:
         """Per cent of the success reward, or what computes it."""

@@ -506,9 +506,13 @@ def entities_of(resolver: Resolver) -> Iterator[Entity]:
     """The agent, the NPCs in cast order, the objects in file order."""
     symbols = resolver.symbols
     kinds: list[str] = []
+    shown = [name for name in symbols.cast if name != AGENT]
+    if any(symbols.scenario.cast[name].seat for name in shown):
+        shown.append(AGENT)  # others see it
+    codes_of = {name: [_code(version, kinds) for version in symbols.cast[name].versions] for name in shown}
     for name in (AGENT, *(n for n in symbols.cast if n != AGENT)):
         member, npc = symbols.cast[name], name != AGENT
-        codes = [_code(version, kinds) for version in member.versions] if npc else []
+        codes = codes_of.get(name, [])
         with surviving():
             _check_shared(resolver, member)
             near, far = _voice(resolver, member)

@@ -438,16 +438,23 @@ def subject_of(
 
 
 def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
-    """Report a question that only the agent can answer, asked of another member."""
+    """Report a question that only a player can answer, asked of a member without a seat."""
     subject = None if isinstance(node, ast.Name) else node.subject
     if subject is None and scope.member == "agent":
         return
-    if not (isinstance(subject, ast.Name) and subject.id == "agent"):
-        name = node.id if isinstance(node, ast.Name) else node.name
-        hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
-        raise resolver.fail(
-            "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
-        )
+    if isinstance(subject, ast.Name) and subject.id == "agent":
+        return
+    name = node.id if isinstance(node, ast.Name) else node.name
+    hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
+    if name in OF_PLAYERS and isinstance(subject, ast.Name) and subject.id in resolver.symbols.scenario.cast:
+        hint = f"or give `{subject.id}` a seat: `seat: open`"
+    raise resolver.fail(
+        "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
+    )
+
+
+OF_PLAYERS: Final = ("did", "action")
+"""Words that are known of every member with a seat."""
 
 
 # -- which values something can have, as far as its declaration says -----------------------------------------

@@ -156,7 +156,9 @@ class RulePlan:
     goto: str | None = None
     goto_now: str | None = None
     reward: int = 0
-    """Per cent of the success reward that a rule of the world adds to the reward of the step."""
+    """Per cent of the success reward that a rule of the world adds to the agent's reward of the step."""
+    rewards: tuple[int, ...] = ()
+    """The same for each of the other seats; empty: they get nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,13 +363,20 @@ class Entity:
 
 @dataclass(frozen=True, slots=True)
 class OutcomePlan:
-    """One entry of `outcome`. `name` is its id, or success@LINE; `graded` is a per cent that is computed at the end."""
+    """One entry of `outcome`. `name` is its id, or success@LINE; `graded` is a per cent that is computed at the end.
+
+    Attributes:
+        percent, graded: what the agent gets. shares: the same for each of the other seats.
+        seats: whose success it is, by number; None: that of all.
+    """
 
     name: str
     success: bool
     percent: int
     condition: SitedTerm
     graded: SitedTerm | None = None
+    shares: tuple[tuple[int, SitedTerm | None], ...] = ()
+    seats: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -570,6 +579,7 @@ class CheckedScenario:
             that says whether it does.
         readings: how conditions were written; None if it was not made from a file.
         addressing: a slot, and the member that each of its words addresses. overheard: whether others hear that.
+        seated: the members of the cast other than the agent that have a seat, by number.
     """
 
     name: str
@@ -607,6 +617,7 @@ class CheckedScenario:
     readings: Readings | None = field(default=None, compare=False, repr=False)
     addressing: tuple[str, tuple[int, ...]] | None = None
     overheard: bool = True
+    seated: tuple[int, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: nothing changes it."""

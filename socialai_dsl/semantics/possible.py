@@ -498,7 +498,7 @@ def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
         for rule in frame.rules:
             when = _with_after(frame, rule, checked.horizon)
             if when is not None:
-                yield when.span, _in_turn(frame, when)
+                yield when.span, _in_turn(checked, frame, when)
     yield from ((rule.when.span, rule.when) for rule in checked.rules if rule.when is not None)
 
 
@@ -519,21 +519,28 @@ def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, Sited
         asked = [step.when for step in frame.steps] + [
             c for block in nested for c in (block.when, block.going)
         ]
-        yield from ((one.span, _in_turn(frame, one)) for one in asked if one is not None)
+        yield from ((one.span, _in_turn(checked, frame, one)) for one in asked if one is not None)
 
 
 def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, SitedTerm]]:
     for frame in checked.frames:
         for step in frame.steps:
             if step.until is not None:
-                yield step.until.span, _in_turn(frame, step.until)
+                yield step.until.span, _in_turn(checked, frame, step.until)
 
 
-def _in_turn(frame: FramePlan, condition: SitedTerm) -> SitedTerm:
-    """A condition as it is asked in the turn of a member: those who come after it have said nothing in this step."""
+def _in_turn(checked: CheckedScenario, frame: FramePlan, condition: SitedTerm) -> SitedTerm:
+    """A condition as it is asked in the turn of a member: those who come after it have said nothing in this step.
+
+    What players say is known from the start of the step on.
+    """
 
     def later(term: Term) -> Term | None:
-        if isinstance(term, terms.SaidBy) and term.entity > frame.entity:
+        if (
+            isinstance(term, terms.SaidBy)
+            and term.entity > frame.entity
+            and term.entity not in checked.seated
+        ):
             return SaidLater(term.entity, term.pattern)
         return None
 

@@ -161,7 +161,18 @@ class FieldOf:
     type: Type
     entity: Term
     name: Literal[
-        "x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside", "toggled", "carrier"
+        "x",
+        "y",
+        "dir",
+        "color",
+        "status",
+        "gone",
+        "poked",
+        "last",
+        "pointing",
+        "inside",
+        "toggled",
+        "carrier",
     ]
 
 

@@ -56,10 +56,11 @@ def act(world: World, body: Entity, primitive: str) -> None:
 
 
 def can_enter(world: World, body: Entity, cell: Cell) -> bool:
-    """Bodies never share a cell, except the agent and hidden NPCs; only the agent steps on what is deadly."""
-    if body is world.agent and world.walkable(cell) and world.deadly(cell):
-        return world.npcs_hidden or all(npc.cell != cell for npc in world.npcs)
-    return geometry.free(world, cell, body)
+    """Bodies share no cell. Only who is played steps on what is deadly, and through others where NPCs are hidden."""
+    if not body.taken:
+        return geometry.free(world, cell, body)
+    alone = all(other is body or other.cell != cell for other in world.members)
+    return world.walkable(cell) and (world.npcs_hidden or alone)
 
 
 def pick_up(world: World, body: Entity, cell: Cell) -> None:
@@ -75,7 +76,7 @@ def put_down(world: World, body: Entity, cell: Cell) -> None:
     thing = world.carried_by(body)
     if thing is None:
         return
-    others = [member for member in (world.agent, *world.npcs) if member.cell == cell]
+    others = [member for member in world.members if member.cell == cell]
     if others:
         if others[0].accepts and world.carried_by(others[0]) is None:
             thing.carrier = others[0]
@@ -84,14 +85,14 @@ def put_down(world: World, body: Entity, cell: Cell) -> None:
 
 
 def toggle(world: World, user: Entity, cell: Cell) -> None:
-    """The agent pokes an NPC in the cell; else the object there changes as its type says."""
+    """Who is played pokes an NPC in the cell; else the object there changes as its type says."""
     npc = next((npc for npc in world.npcs if npc.cell == cell), None)
-    if npc is not None and user is world.agent:
+    if npc is not None and user.taken:
         npc.poked = npc.was_poked = True
         return
     thing = world.object_at(cell)
     if thing is not None:
-        thing.poked = thing.poked or user is world.agent
+        thing.poked = thing.poked or user.seat
         thing.toggled_by.append(user)
         changes = TYPES[thing.type].toggled
         if thing.one_way:

@@ -146,7 +146,7 @@ def _name(node: ast.Name, context: Context) -> Any:
         "self": lambda: me,
         "objects": world.things,
         "cells": lambda: [cell for cell in world.interior() if cell not in world.terrain],
-        "cast": lambda: [world.agent, *world.npcs],
+        "cast": lambda: world.members,
         "colors": lambda: list(COLORS),
         "directions": lambda: list(DIRECTIONS),
         "nouns": lambda: speech.noun_values(world),

@@ -111,7 +111,7 @@ class FrameRunner:
         if turn.say is None:
             turn.say, turn.filled, turn.to = text, filled, to
             turn.tone = None if self.world.tone is None else self.me.looks.get(self.world.tone)
-            if self.me.sort == "npc":
+            if not self.me.taken:
                 self.me.utterance = text
 
     def end(self, turn: Turn) -> str | None:

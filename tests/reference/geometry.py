@@ -170,7 +170,5 @@ def free(world: World, cell: Cell, body: Entity | None) -> bool:
     """Whether a body could stand there: walkable, not deadly, nobody else in it. Hidden NPCs do not stop the agent."""
     if not world.walkable(cell) or world.deadly(cell):
         return False
-    others: list[Entity] = [*world.npcs, world.agent]
-    if body is world.agent and world.npcs_hidden:
-        others = []
+    others = [] if body is world.agent and world.npcs_hidden else world.members
     return all(other is body or other.cell != cell for other in others)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 import re
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from tests.reference import bodies, chance, geometry, motion, rules, speech
-from tests.reference.effects import remember
+from tests.reference.effects import remember, vanish
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds
 from tests.reference.frames import FrameRunner, Turn
 from tests.reference.picture import picture
@@ -27,7 +28,7 @@ ATTEMPTS = 64
 
 @dataclass
 class Result:
-    """What the agent perceives after a reset or a step, and how the step ended."""
+    """What a seat perceives after a reset or a step, and how the step ended for it."""
 
     image: np.ndarray
     tokens: list[int]
@@ -37,11 +38,13 @@ class Result:
     heard: tuple[str, ...] = ()
     words: list[str] = field(default_factory=list)  # of the tokens
     outcome: int | str | None = None  # its id, else its place in `outcome`; deadly, timeout
+    success: bool = False
 
 
 class Reference:
     """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data.
 
+    `reset` and `step` are about the agent's seat alone, `reset_all` and `play` about all.
     `words` are the numbers of words; without them it works out itself which words the scenario has.
     """
 
@@ -54,9 +57,10 @@ class Reference:
             max(sizes(self.scenario, self.sources, "width")),
             max(sizes(self.scenario, self.sources, "height")),
         )
-        self.history: list[list[str]] = []  # the words of each line
+        self.history: dict[str, list[list[str]]] = {}  # of each seat, the words of each line
         self.world = World(0)
         self.rooms_refused = 0
+        self.deaths = 0  # in the last step
 
     # -- reset ---------------------------------------------------------------------------------------------
 
@@ -68,6 +72,17 @@ class Reference:
         test: bool = False,
         layout: dict[str, Any] | None = None,
     ) -> Result:
+        """Begins an episode; what the agent perceives."""
+        return self.reset_all(seed, index, episode, test, layout)[0]
+
+    def reset_all(
+        self,
+        seed: int = 0,
+        index: int = 0,
+        episode: int = 0,
+        test: bool = False,
+        layout: dict[str, Any] | None = None,
+    ) -> list[Result]:
         """Draws the room until all that is required of it holds; at reset the history is empty."""
         key = chance.episode(chance.TEST_SET if test else seed, index, episode)
         for attempt in range(ATTEMPTS):
@@ -79,8 +94,12 @@ class Reference:
             self.rooms_refused += 1
         else:
             raise RuntimeError(f"{self.scenario.scenario}: no room has all that is required of it")
-        self.history = []
-        return Result(picture(self.world, self.canvas), [])
+        self.history = {seat.key: [] for seat in self.world.seats}
+        return [Result(image, []) for image in self.pictures()]
+
+    def pictures(self) -> list[np.ndarray]:
+        """What each seat sees now."""
+        return [picture(self.world, self.canvas, seat) for seat in self.world.seats]
 
     def new_world(self, key: int) -> World:
         """A world with nothing in it."""
@@ -151,28 +170,39 @@ class Reference:
     # -- step ----------------------------------------------------------------------------------------------
 
     def step(self, action: Action) -> Result:
-        """One step. An action is (primitive, speak, template, noun); the primitive after the last is none."""
+        """One step in which the agent alone is played."""
+        return self.play({"agent": action})[0]
+
+    def play(self, actions: Mapping[str, Action]) -> list[Result]:
+        """One step in which these members are played, the agent one of them; the results of all seats in their order.
+
+        An action is (primitive, speak, template, noun); the primitive after the last is none.
+        """
         world = self.world
         # Step 0: what is asked of the state that the last step left, then the clock.
         self.look_back()
-        self.begin_step()
-        self.note(action)
-        # Step 1: the agent's body action. A scripted agent reads its `first` before.
+        self.begin_step(actions)
+        players = [seat for seat in world.seats if self.is_played(seat)]
+        for player in players:
+            self.note(player, actions[player.key])
+        # Step 1: the body actions, the agent's first. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
         runner.perform_utterance(turn)
         turn.activity.primitive(world, world.agent)  # what its frame asks for, whatever the agent does
-        bodies.act(world, world.agent, self.primitive(action))
+        self.move(players, actions)
         # Links are direct consequences and part of an early picture; computed statuses are not.
         self.settling.links()
         is_early = self.scenario.observe.image == "before_npcs"
-        image = picture(world, self.canvas) if is_early else None
+        images = self.pictures() if is_early else []
         self.settling.statuses()
         # Step 2: what counts, then what moves by itself.
         self.go_on()
-        # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read.
-        self.utter(action)
+        # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read, then others speak.
+        if world.agent in players:
+            self.utter(world.agent, actions["agent"])
         runner.end(turn)
+        self.speak([player for player in players if player is not world.agent], actions)
         # Step 4: NPCs in cast order.
         for npc in world.npcs:
             self.npc_turn(npc)
@@ -183,16 +213,40 @@ class Reference:
         # Steps 6 and 7: the world's rules, then it settles.
         rules.run(self.scenario, self.sources, world)
         self.settling.all()
-        self.remember()
-        # Step 8: outcome, then time.
-        result = self.judge()
-        result.reward += world.bonus / 100 + self.scenario.reward.each_step
-        # Step 9: the observation.
-        result.image = picture(world, self.canvas) if image is None else image
-        result.words = [word for line in self.history for word in line]
+        # Step 8: who was on a deadly cell is no more; outcome, then time.
+        self.deaths = self.die()
+        results = self.judge()
+        # Step 9: the observations.
+        for seat, result, image in zip(world.seats, results, images or self.pictures(), strict=True):
+            result.reward += seat.bonus / 100 + self.scenario.reward.each_step
+            self.perceive(seat, result, image)
+        return results
+
+    def move(self, players: list[Entity], actions: Mapping[str, Action]) -> None:
+        """The bodies of players, one after the other."""
+        for player in players:
+            bodies.act(self.world, player, self.primitive(actions[player.key]))
+
+    def speak(self, players: list[Entity], actions: Mapping[str, Action]) -> None:
+        """The voices of players, one after the other."""
+        for player in players:
+            if not player.gone:
+                self.utter(player, actions[player.key])
+
+    def is_played(self, seat: Entity) -> bool:
+        """Whether somebody acts on a seat in this step: where there are several, only for who is in the room."""
+        return seat.taken and not (seat.gone and len(self.world.seats) > 1)
+
+    def perceive(self, seat: Entity, result: Result, image: np.ndarray) -> None:
+        """What a seat sees and hears; beyond the length of its history the oldest whole lines are dropped."""
+        history = self.history[seat.key]
+        history += map(self.read, seat.lines)
+        while sum(map(len, history)) > self.vocabulary.length:
+            history.pop(0)
+        result.image = image
+        result.words = [word for line in history for word in line]
         result.tokens = self.vocabulary.tokens(result.words)
-        result.heard = tuple(map(self.line, world.lines))
-        return result
+        result.heard = tuple(map(self.line, seat.lines))
 
     def look_back(self) -> None:
         """Keeps the state for `prev`, and which memories are open in this step."""
@@ -221,18 +275,26 @@ class Reference:
         except NothingFoundError:
             return False
 
-    def begin_step(self) -> None:
-        """The clock; what is true of one step only is forgotten."""
+    def begin_step(self, played: Collection[str]) -> None:
+        """The clock; what is true of one step only is forgotten. On some seats others sit than before."""
         self.world.t += 1
-        self.world.lines = []
-        self.world.bonus = 0
         for member in self.world.cast.values():
             member.utterance, member.filled, member.pair = None, {}, 0
-            member.action, member.poked = "none", False
-            member.bumped = False
+            member.bumped = member.poked = False
+            member.lines, member.bonus = [], 0
+            if member.taken or member.key in played:
+                self.forget_use(member)
+            member.taken = member.key in played
+            if member.seat and not member.taken and not self.takes_turns(member):
+                member.action = member.last_act = "none"
+            if member.taken:
+                member.action, member.tone = "none", self.tone_of(member)
         for thing in self.world.things():
             thing.poked = False
-        self.forget_use(self.world.agent)
+
+    def tone_of(self, player: Entity) -> str | None:
+        """The tone in which a player speaks; the agent has none."""
+        return None if player is self.world.agent else player.looks.get(str(self.world.tone))
 
     def forget_use(self, user: Entity) -> None:
         """What somebody toggled at is toggled until his next turn."""
@@ -243,14 +305,14 @@ class Reference:
         """The word for the first number of an action."""
         return self.scenario.actions[action[0]] if action[0] < len(self.scenario.actions) else "none"
 
-    def note(self, action: Action) -> None:
-        """What the agent does and says in this step is known from its start."""
-        agent, grammar = self.world.agent, self.scenario.grammar
+    def note(self, player: Entity, action: Action) -> None:
+        """What a player does and says in this step is known from its start."""
+        grammar = self.scenario.grammar
         _, speaks, *spoken = action
-        agent.action = self.primitive(action)
+        player.action = self.primitive(action)
         if speaks:
-            agent.pair = 1 + grammar.pairs().index(grammar.meant(*spoken))
-            agent.utterance, agent.filled = speech.pair(self.world, grammar, agent.pair)
+            player.pair = 1 + grammar.pairs().index(grammar.meant(*spoken))
+            player.utterance, player.filled = speech.pair(self.world, grammar, player.pair)
 
     def go_on(self) -> None:
         """Timers, then things that roll, in object order; then the world settles."""
@@ -258,41 +320,45 @@ class Reference:
         motion.roll(self.world)
         self.settling.all()
 
-    def utter(self, action: Action) -> None:
-        """The agent speaks if it wants to."""
+    def utter(self, player: Entity, action: Action) -> None:
+        """A player speaks who wants to."""
         if action[1]:
-            agent, grammar = self.world.agent, self.scenario.grammar
-            text, filled = speech.pair(self.world, grammar, agent.pair)
+            grammar = self.scenario.grammar
+            text, filled = speech.pair(self.world, grammar, player.pair)
             to = filled.get(grammar.to[1:-1]) if grammar.to else None
-            speech.speak(self.world, agent, text, filled, to)
+            speech.speak(self.world, player, text, filled, to, player.tone)
+
+    def takes_turns(self, npc: Entity) -> bool:
+        """Whether a member has a frame or beliefs."""
+        return npc.frame is not None or any(self.sources.beliefs_of(npc))
 
     def npc_turn(self, npc: Entity) -> None:
-        """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
-        self.forget_use(npc)
+        """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it.
+
+        Who is played has had its body and its voice, and only what its frame brings about happens now.
+        """
+        if not npc.taken:
+            self.forget_use(npc)
         if npc.gone:
             npc.inbox.clear()
-            npc.last_act = "none"
+            npc.action = npc.last_act = "none"
             return
         runner = FrameRunner(self.sources, self.world, npc)
         turn = runner.begin()
         # What `first` caused may have made it vanish; what has vanished does nothing.
         if not npc.gone:
             runner.perform_utterance(turn)
-            bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
-            # Who has neither a frame nor beliefs takes no turn, so nothing settles because of it.
-            if runner.frame is not None or any(self.sources.beliefs_of(npc)):
+            primitive = turn.activity.primitive(self.world, npc)
+            if not npc.taken:
+                bodies.act(self.world, npc, primitive)
+            # Nothing settles because of who takes no turn.
+            if self.takes_turns(npc):
                 self.settling.all()
             runner.end(turn)
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
-        if turn.say is not None:
+        if turn.say is not None and not npc.taken:
             speech.speak(self.world, npc, turn.say, turn.filled, turn.to, turn.tone)
-
-    def remember(self) -> None:
-        """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
-        self.history += map(self.read, self.world.lines)
-        while sum(map(len, self.history)) > self.vocabulary.length:
-            self.history.pop(0)
 
     def read(self, heard: Heard) -> list[str]:
         """The words of a line, after a mark of who says it where lines are marked."""
@@ -311,31 +377,59 @@ class Reference:
         to = f" to {heard.to.name}" if heard.to is not None and heard.speaker.sort == "npc" else ""
         return f"{heard.speaker.name}{to}: {heard.text}"
 
-    def judge(self) -> Result:
-        """How the step ended: deadly before everything, the first outcome that holds, then time."""
-        world, nothing = self.world, np.empty(0, dtype=np.uint8)
-        if world.agent.cell is not None and world.deadly(world.agent.cell):
-            return Result(nothing, [], terminated=True, outcome="deadly")
+    def die(self) -> int:
+        """How many of those who are played are on a deadly cell; where there are several seats, they vanish."""
+        world = self.world
+        dead = [s for s in world.seats if s.taken and s.cell is not None and world.deadly(s.cell)]
+        if dead and len(world.seats) > 1:
+            for seat in dead:
+                vanish(seat)
+            self.settling.all()
+        return len(dead)
+
+    def all_dead(self) -> bool:
+        """Whether somebody died in this step, and nobody is left to play."""
+        seats = self.world.seats
+        return self.deaths > 0 and (len(seats) == 1 or all(seat.gone for seat in seats if seat.taken))
+
+    def judge(self) -> list[Result]:
+        """How the step ended for each seat: deadly before everything, the first outcome that holds, then time."""
+        world, seats = self.world, self.world.seats
+        if self.all_dead():
+            return [ended(terminated=True, outcome="deadly") for _ in seats]
         for number, outcome in enumerate(self.scenario.outcome):
             kind = "success" if outcome.success is not None else "failure"
             value = self.sources.expression(f"outcome[{number}].{kind}", getattr(outcome, kind))
             try:
                 if not holds(value, Context(world)):
                     continue
-                paid = self.paid(outcome, number) if kind == "success" else 0.0
+                won = [kind == "success" and self.is_for(outcome, seat) for seat in seats]
+                paid = [
+                    self.paid(outcome, number, seat) if wins else 0.0
+                    for seat, wins in zip(seats, won, strict=True)
+                ]
             except NothingFoundError:
                 continue
-            return Result(
-                nothing, [], paid, terminated=True, outcome=number if outcome.id is None else outcome.id
-            )
+            name = number if outcome.id is None else outcome.id
+            return [
+                ended(reward=reward, terminated=True, outcome=name, success=wins)
+                for reward, wins in zip(paid, won, strict=True)
+            ]
         if world.t >= self.scenario.horizon:
-            return Result(nothing, [], truncated=True, outcome="timeout")
-        return Result(nothing, [])
+            return [ended(truncated=True, outcome="timeout") for _ in seats]
+        return [ended() for _ in seats]
 
-    def paid(self, outcome: Outcome, number: int) -> float:
-        """The reward of a success: a share of what is left of it by now."""
-        path = f"outcome[{number}].reward"
-        per_cent = evaluate(self.sources.expression(path, outcome.reward), Context(self.world))
+    def is_for(self, outcome: Outcome, seat: Entity) -> bool:
+        """Whether a success is one of a seat."""
+        return not outcome.for_ or self.scenario.named(seat.key, outcome.for_) is not None
+
+    def paid(self, outcome: Outcome, number: int, seat: Entity) -> float:
+        """The reward of a success for a seat: a share of what is left of it by now."""
+        path, share = f"outcome[{number}].reward", outcome.reward
+        if isinstance(share, dict):
+            name = self.scenario.named(seat.key, share)
+            path, share = f"{path}.{name}", 0 if name is None else share[name]
+        per_cent = evaluate(self.sources.expression(path, share), Context(self.world))
         left = 1 - self.scenario.reward.slope * self.world.t / self.scenario.horizon
         return float(min(max(per_cent, 0), 100) / 100 * left)
 
@@ -377,7 +471,7 @@ class Reference:
             self.world = world = copy.deepcopy(self.world)
             self.settling = Settling(self.scenario, self.sources, world)
             self.look_back()
-            self.begin_step()
+            self.begin_step({"agent"})
             runner = FrameRunner(self.sources, world, world.agent)
             turn: Turn = runner.begin()
             runner.perform_utterance(turn)
@@ -498,6 +592,11 @@ class Reference:
             "state": thing.status,
             "gone": thing.gone,
         }
+
+
+def ended(**how: Any) -> Result:
+    """How a step ended for a seat; what it perceives comes later."""
+    return Result(np.empty(0, dtype=np.uint8), [], **how)
 
 
 def plain(value: Any) -> Any:

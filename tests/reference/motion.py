@@ -51,5 +51,5 @@ def roll(world: World) -> None:
 
 def clear(world: World, cell: Cell) -> bool:
     """Whether something can roll there: nothing solid, nobody, nothing deadly."""
-    bodies: list[Entity] = [*world.npcs, world.agent]
-    return world.walkable(cell) and not world.deadly(cell) and all(body.cell != cell for body in bodies)
+    nobody = all(member.cell != cell for member in world.members)
+    return world.walkable(cell) and not world.deadly(cell) and nobody

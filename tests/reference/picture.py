@@ -1,4 +1,4 @@
-"""The agent's view: 7 x 7 cells of (type, colour, status, orientation)."""
+"""The view of a seat: 7 x 7 cells of (type, colour, status, orientation)."""
 
 from __future__ import annotations
 
@@ -17,37 +17,41 @@ NOWHERE = (-1000, -1000)
 """Where an agent looks from that had no cell to be put on: all that it sees lies off the canvas."""
 
 
-def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
-    """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4), with gestures
-    (7, 7, 6), with cells that are pointed at (7, 7, 8)."""
+def picture(world: World, canvas: tuple[int, int], viewer: Entity) -> np.ndarray:
+    """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the viewer, a member with a seat; uint8
+    (7, 7, 4), with gestures (7, 7, 6), with cells that are pointed at (7, 7, 8)."""
     behind = 4 + world.gestures + world.hands
     more = behind - 4 + len(world.shown_looks)
     image = np.full((SIZE, SIZE, 4 + more), NOTHING, dtype=np.uint8)
-    agent = world.agent
-    eye = agent.cell or NOWHERE
-    bright = lit(world, eye, agent.facing, SIZE) if world.occlusion and agent.cell else None
+    eye = viewer.cell or NOWHERE
+    bright = lit(world, eye, viewer.facing, SIZE) if world.occlusion and viewer.cell else None
     for i in range(SIZE):
         for j in range(SIZE):
             ahead, right = 6 - j, i - 3
-            cell = cell_in_view(eye, agent.facing, ahead, right)
+            cell = cell_in_view(eye, viewer.facing, ahead, right)
+            person = person_shown(world, cell, viewer)
             if bright is not None and (ahead, right) not in bright:
                 image[i, j, :4] = UNSEEN
             elif ahead == right == 0:
-                carried = world.carried_by(agent)
+                carried = world.carried_by(viewer)
                 image[i, j, :4] = EMPTY if carried is None else thing_shown(carried)
+                # Its own cell tells a player on which seat it sits.
+                number = world.seats.index(viewer)
+                image[i, j, 3] = number or image[i, j, 3]
                 image[i, j, behind:] = looks(world, carried)
             else:
-                image[i, j, :4] = shown(world, cell, canvas)
-                image[i, j, 4 : 4 + world.gestures] = gestures(world, cell)[: world.gestures]
+                image[i, j, :4] = shown(world, cell, canvas, person, viewer)
+                image[i, j, 4 : 4 + world.gestures] = gestures(world, person, viewer)[: world.gestures]
                 if world.hands:
-                    image[i, j, behind - 1] = hands(world, cell)
-                image[i, j, behind:] = looks(world, npc_shown(world, cell) or world.object_at(cell))
+                    image[i, j, behind - 1] = hands(world, person)
+                image[i, j, behind:] = looks(world, person or world.object_at(cell))
     return image
 
 
-def npc_shown(world: World, cell: Cell) -> Entity | None:
-    """The NPC that is seen in a cell."""
-    return next((npc for npc in world.npcs if npc.cell == cell and not world.npcs_hidden), None)
+def person_shown(world: World, cell: Cell, viewer: Entity) -> Entity | None:
+    """The member of the cast that is seen in a cell."""
+    others = [member for member in world.members if member is not viewer and not world.npcs_hidden]
+    return next((member for member in others if member.cell == cell), None)
 
 
 def looks(world: World, entity: Entity | None) -> list[int]:
@@ -56,27 +60,25 @@ def looks(world: World, entity: Entity | None) -> list[int]:
     return [words.index(has[name]) if name in has else NOTHING for name, words in world.shown_looks.items()]
 
 
-def hands(world: World, cell: Cell) -> int:
-    """What an NPC in the cell carries: its type, and its colour times 32."""
-    npc = npc_shown(world, cell)
-    thing = None if npc is None else world.carried_by(npc)
+def hands(world: World, person: Entity | None) -> int:
+    """What somebody carries: its type, and its colour times 32."""
+    thing = None if person is None else world.carried_by(person)
     return NOTHING if thing is None else TYPES[thing.type].code + 32 * COLORS.index(str(thing.color))
 
 
-def gestures(world: World, cell: Cell) -> tuple[int, int, int, int]:
-    """Where an NPC in the cell points, its last act, and how far to the right and ahead of it the cell lies that it
-    points at, from 128."""
-    npc = npc_shown(world, cell)
-    if npc is None:
+def gestures(world: World, person: Entity | None, viewer: Entity) -> tuple[int, int, int, int]:
+    """Where somebody points, its last act, and how far to the right and ahead of it the cell lies that it points at,
+    from 128."""
+    if person is None or person.cell is None:
         return NOTHING, NOTHING, NOTHING, NOTHING
-    direction, right, ahead = npc.pointing, NOTHING, NOTHING
+    direction, right, ahead = person.pointing, NOTHING, NOTHING
     if isinstance(direction, tuple):
-        right, ahead = (128 + cells for cells in right_and_ahead(world.agent.facing, cell, direction))
-        direction = quadrant(cell, direction)
-    towards = NOTHING if direction is None else direction_shown(world, direction)
-    act = LAST_ACTS.get(npc.last_act, LAST_ACTS["none"])
+        right, ahead = (128 + cells for cells in right_and_ahead(viewer.facing, person.cell, direction))
+        direction = quadrant(person.cell, direction)
+    towards = NOTHING if direction is None else direction_shown(world, direction, viewer)
+    act = LAST_ACTS.get(person.last_act, LAST_ACTS["none"])
     # Who was reset after pointing has taken its arm down.
-    points = npc.last_act == "point" and npc.pointing is not None
+    points = person.last_act == "point" and person.pointing is not None
     return towards, act + towards if points else act, right, ahead
 
 
@@ -86,14 +88,16 @@ def right_and_ahead(facing: str, start: Cell, goal: Cell) -> tuple[int, int]:
     return {"up": (dx, -dy), "right": (dy, dx), "down": (-dx, dy), "left": (-dy, -dx)}[facing]
 
 
-def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, int, int]:
+def shown(
+    world: World, cell: Cell, canvas: tuple[int, int], person: Entity | None, viewer: Entity
+) -> tuple[int, int, int, int]:
     """What one cell looks like. Beyond the room but on the canvas it reads empty, off the canvas wall."""
     if not world.inside(cell):
         on_canvas = 0 <= cell[0] < canvas[0] and 0 <= cell[1] < canvas[1]
         return EMPTY if on_canvas else WALL
-    for npc in world.npcs:
-        if npc.cell == cell and not world.npcs_hidden:
-            return NPC, COLORS.index(str(npc.color)), npc.kind_code, direction_shown(world, npc.facing)
+    if person is not None:
+        way = direction_shown(world, person.facing, viewer)
+        return NPC, COLORS.index(str(person.color)), person.kind_code, way
     thing = world.object_at(cell)
     if thing is not None:
         return thing_shown(thing)
@@ -111,7 +115,7 @@ def thing_shown(thing: Entity) -> tuple[int, int, int, int]:
     return type_.code, COLORS.index(str(thing.color)), type_.states.index(seen), tag
 
 
-def direction_shown(world: World, facing: str) -> int:
-    """The number of a direction; egocentric: 2 towards where the agent looks, 0 back at it."""
+def direction_shown(world: World, facing: str, viewer: Entity) -> int:
+    """The number of a direction; egocentric: 2 towards where the viewer looks, 0 back at it."""
     number = DIRECTIONS.index(facing)
-    return (number - DIRECTIONS.index(world.agent.facing) + 2) % 4 if world.egocentric else number
+    return (number - DIRECTIONS.index(viewer.facing) + 2) % 4 if world.egocentric else number

@@ -145,16 +145,17 @@ class Setup:
                 thing.carryable = group.carryable
                 thing.only_rolled = group.pushed_by is not None
             self.world.objects[name] = things[0] if size is None else things
-        kinds = self.kinds()
+        kinds, seats = self.kinds(), self.scenario.seats()
         for name, member in self.members.items():
             person = Entity(name, "agent" if name == "agent" else "npc", kind=member.kind or "peer")
             person.view = member.view or 7
             person.pushed_aside = member.pushed_by == "anybody"
             person.frame = member.frame
             person.state = self.start_of(member.frame)
-            if name != "agent":
-                # "NPC status = index of its kind in order of first appearance in the cast."
-                person.kind_code = kinds.index(person.kind) if member.kind_code is None else member.kind_code
+            # "NPC status = index of its kind in order of first appearance in the cast"; the agent's comes last.
+            known = list(dict.fromkeys([*kinds, person.kind]))
+            person.kind_code = known.index(person.kind) if member.kind_code is None else member.kind_code
+            person.seat, person.taken = name in seats, name == "agent"
             if name in self.scenario.files:
                 drawn = self.scenario.versions(name).index(member)
                 person.drawn_from = list(self.scenario.files[name])[drawn]

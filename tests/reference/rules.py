@@ -36,4 +36,9 @@ def apply(rule: Rule, path: str, sources: Sources, world: World) -> None:
     for verb, targets, status in effects:
         for target in targets:
             affect(world, target, verb, status)
-    world.bonus += rule.reward
+    for seat in world.seats:
+        per_cent = rule.reward
+        if isinstance(per_cent, dict):
+            name = sources.scenario.named(seat.key, per_cent)
+            per_cent = 0 if name is None else per_cent[name]
+        seat.bonus += per_cent

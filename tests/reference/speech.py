@@ -116,7 +116,7 @@ def speak(
     to: Entity | None = None,
     tone: str | None = None,
 ) -> None:
-    """Says a line, perhaps addressed to one member: everyone within earshot hears it, the agent also its tone."""
+    """Says a line, perhaps addressed to one member: everyone within earshot hears it, players also its tone."""
     if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
@@ -124,22 +124,27 @@ def speak(
     for hearer in world.cast.values():
         if hearer is speaker or not within_earshot(world, speaker, hearer):
             continue
-        # "Hidden NPCs: nothing they say reaches the agent, except a member with `audible: always`."
-        if hearer is world.agent and world.npcs_hidden and speaker.key not in world.always_audible:
-            continue
         if to not in (None, hearer) and not world.overheard:
             continue
+        # "Hidden NPCs: nothing they say reaches the agent, except a member with `audible: always`."
+        inaudible = world.npcs_hidden and speaker.key not in world.always_audible
+        if hearer is world.agent and inaudible:
+            continue
         hearer.inbox.append(Heard(speaker, text, filled or {}, to))
-        if hearer is world.agent:
-            world.lines.append(replace(hearer.inbox[-1], text=text if tone is None else f"({tone}) {text}"))
-    if speaker is world.agent and world.own_voice:
-        world.lines.append(Heard(speaker, text, filled or {}, to))
+        if not inaudible:
+            hearer.lines.append(toned(hearer.inbox[-1], tone))
+    if world.own_voice and speaker.taken and not speaker.gone:
+        speaker.lines.append(toned(Heard(speaker, text, filled or {}, to), tone))
+
+
+def toned(heard: Heard, tone: str | None) -> Heard:
+    """A line as players hear it."""
+    return heard if tone is None else replace(heard, text=f"({tone}) {heard.text}")
 
 
 def in_speaking_order(world: World, inbox: list[Heard]) -> list[Heard]:
     """What was heard in a turn, the agent's first, then in cast order."""
-    order = [world.agent, *world.npcs]
-    return sorted(inbox, key=lambda heard: order.index(heard.speaker))
+    return sorted(inbox, key=lambda heard: world.members.index(heard.speaker))
 
 
 def pair(world: World, grammar: Grammar, number: int) -> tuple[str, dict[str, Any]]:

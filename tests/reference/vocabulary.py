@@ -47,6 +47,7 @@ class Vocabulary(Words):
     def __init__(self, scenario: Script, sources: Sources) -> None:
         self.scenario, self.sources = scenario, sources
         self.members = {name: scenario.versions(name) for name in scenario.cast}
+        self.seats = scenario.seats()
         super().__init__({}, 0)
         self.ranges: dict[tuple[Who, str], tuple[int, int]] = {}  # of registers that are being worked out
         for text in self.in_order_of_appearance():
@@ -84,26 +85,35 @@ class Vocabulary(Words):
             yield "to"
 
     def lines(self) -> Iterator[str]:
-        """All that the agent may hear, and the names of who says it."""
-        for name in self.members:
-            if name == "agent" and not self.scenario.observe.own_voice:
-                continue
+        """All that seats may hear, and the names of who says it."""
+        for name in self.speakers():
             texts = {text for who in self.who(name) for text in self.texts(who)}
             tones = [f"({word}) " for word in self.tones(name)] or [""]
+            texts |= {*(self.utterances() if name in self.seats else ())}
+            said = [f"{tone}{text}" for tone, text in product(tones, texts)]
             if self.scenario.observe.names == "hidden" or self.scenario.observe.lines == "marked":
-                yield from (f"{tone}{text}" for tone, text in product(tones, texts))
-            elif texts:
+                yield from said
+            elif said:
                 names = self.names_of(name)
                 yield from names
-                yield from (f"{who}: {tone}{text}" for who, tone, text in product(names, tones, texts))
+                yield from (f"{who}: {text}" for who, text in product(names, said))
+
+    def speakers(self) -> list[str]:
+        """The members that some seat may hear: the agent only by itself, or by others who have a seat."""
+        heard = self.scenario.observe.own_voice or len(self.seats) > 1
+        return [name for name in self.members if name != "agent" or heard]
+
+    def utterances(self) -> list[str]:
+        """All that the grammar has."""
+        grammar = self.scenario.grammar
+        return [grammar.utterance(*spoken) for spoken in grammar.pairs()]
 
     def texts(self, member: Who) -> Iterator[str]:
-        """All that a member may say."""
+        """All that a member may say by its frame."""
         for value in self.sayings(member) if member[0] != "agent" else ():
             yield from map("".join, product(*self.pieces(value.tree, member)))
-        if member[0] == "agent" or self.performs(member):
-            grammar = self.scenario.grammar
-            yield from (grammar.utterance(*spoken) for spoken in grammar.pairs())
+        if self.performs(member) and member[0] != "agent":
+            yield from self.utterances()
 
     # -- what can be said ----------------------------------------------------------------------------------
 
@@ -427,24 +437,22 @@ class Vocabulary(Words):
 
     def longest_history(self) -> int:
         """The number of tokens kept: every speaker's longest line at every step, in eights, 8 to 256."""
-        per_step = sum(
-            max(self.longest_line(who) for who in self.who(name)) for name in self.members if name != "agent"
-        )
-        if self.scenario.observe.own_voice:
-            per_step += self.longest_utterance() + self.longest_name("agent")
+        per_step = sum(max(map(self.longest_line, self.who(name))) for name in self.speakers())
         bound = self.scenario.horizon * per_step
         return min(LONGEST, max(8, (bound + 7) // 8 * 8))
 
     def longest_line(self, member: Who) -> int:
         """The words of a member's longest line, its name included; 0 if it says nothing."""
+        name = member[0]
         lengths = [
             sum(max(len(self.heard(text)) for text in piece) for piece in self.pieces(value.tree, member))
             for value in self.sayings(member)
+            if name != "agent"
         ]
-        if self.performs(member):
+        if name in self.seats or self.performs(member):
             lengths.append(self.longest_utterance())
-        tone = max((len(self.heard(text)) for text in self.tones(member[0])), default=0)
-        return self.longest_name(member[0]) + tone + max(lengths) if lengths else 0
+        tone = max((len(self.heard(text)) for text in self.tones(name)), default=0)
+        return self.longest_name(name) + tone + max(lengths) if lengths else 0
 
     def longest_name(self, name: str) -> int:
         """The words before a member's lines; none where names are hidden."""

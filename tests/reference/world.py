@@ -184,6 +184,11 @@ class Entity:
     poked: bool = False
     was_poked: bool = False
     accepts: bool = True  # in this step
+    seat: bool = False  # whether somebody outside of the file may play it
+    taken: bool = False  # whether somebody does, in this step
+    lines: list[Heard] = field(default_factory=list)  # what its seat hears in this step
+    tone: str | None = None  # in which its player speaks in this step
+    bonus: int = 0  # per cent that rules pay its seat in this step
     pushed_aside: bool = False  # whoever walks into it moves it
 
     @property
@@ -259,8 +264,6 @@ class World:
     look_names: dict[str, tuple[str, ...]] = field(default_factory=dict)
     shown_looks: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words of those that it shows
     canvas: tuple[int, int] = (0, 0)
-    bonus: int = 0  # per cent that rules pay in this step
-    lines: list[Heard] = field(default_factory=list)  # what the agent heard in this step
 
     @property
     def agent(self) -> Entity:
@@ -271,6 +274,16 @@ class World:
     def npcs(self) -> list[Entity]:
         """All NPCs, in the order they act."""
         return [member for member in self.cast.values() if member.sort == "npc"]
+
+    @property
+    def members(self) -> list[Entity]:
+        """The whole cast, the agent before NPCs."""
+        return [self.agent, *self.npcs]
+
+    @property
+    def seats(self) -> list[Entity]:
+        """All members with a seat, in the order in which they move and speak."""
+        return [member for member in self.members if member.seat]
 
     def things(self) -> list[Entity]:
         """All objects, in file order."""
@@ -325,7 +338,7 @@ class World:
         return self._holds(cell, "transparent")
 
     def deadly(self, cell: Cell) -> bool:
-        """Whether the cell kills the agent: what is seen there decides."""
+        """Whether the cell kills who is played: what is seen there decides."""
         thing = self.object_at(cell)
         seen = self.terrain.get(cell) if thing is None else thing.type
         return seen is not None and TYPES[seen].deadly

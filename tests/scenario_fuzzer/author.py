@@ -12,6 +12,7 @@ import yaml
 from tests.scenario_fuzzer.behaviour import Behaviour
 from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Look, Row, Thing
 from tests.scenario_fuzzer.phrases import COLORS, Phrases, Where
+from tests.scenario_fuzzer.seats import entries, give_seats
 
 NOUNS: tuple[tuple[str | int, ...], ...] = (
     (1, 2, 3, 4),
@@ -54,6 +55,12 @@ def write_asking(seed: int) -> str:
     author = _Author(Random(seed))
     made = author.scenario(f"random_{seed}")
     made["probes"] = {f"probe_{number}": author.probe() for number in range(4)}
+    return yaml.safe_dump(made, sort_keys=False, width=110, allow_unicode=True)
+
+
+def write_seated(seed: int) -> str:
+    """The same scenario with seats for some of its cast."""
+    made = give_seats(_Author(Random(seed)).scenario(f"random_{seed}"), Random(f"seats of {seed}"))
     return yaml.safe_dump(made, sort_keys=False, width=110, allow_unicode=True)
 
 
@@ -101,8 +108,8 @@ class _Author:
         played = {frame.name: self.frame(frame, behaviour) for frame in frames}
         if self.often(0.2):
             made["overheard"] = False
-        if not ("to" in made["grammar"] or any("to" in entry for entry in mappings(played))):
-            for entry in mappings(played):
+        if not ("to" in made["grammar"] or any("to" in entry for entry in entries(played))):
+            for entry in entries(played):
                 entry.pop("addressed", None)
         say_somewhere([played[frame.name] for frame in frames if not frame.of_agent], SAYINGS)
         tell_numbers(name, made["grammar"], [played[frame.name] for frame in frames if not frame.of_agent])
@@ -734,10 +741,3 @@ def tell_numbers(name: str, grammar: dict[str, Any], frames: list[dict[str, Any]
     for rule in (says, hears | {"say": "It makes <heap + 1>"}):
         state = rng.choice([*rng.choice(told)["states"].values()])
         state.setdefault("then", []).insert(0, rule)
-
-
-def mappings(part: Any) -> list[dict[str, Any]]:
-    """All mappings in something that is written."""
-    inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
-    found = [one for each in inner for one in mappings(each)]
-    return [part, *found] if isinstance(part, dict) else found

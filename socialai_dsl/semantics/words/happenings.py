@@ -6,17 +6,19 @@ from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import groups, texts
+from socialai_dsl.semantics import groups, seats, texts
 from socialai_dsl.semantics.groups import must_be_agent
 from socialai_dsl.semantics.resolver import ENTITY
 from socialai_dsl.semantics.scope import ReportedError, of_each, quoted
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
+    TURN,
     Compare,
     Const,
     FieldOf,
     InState,
+    Operation,
     PokedNow,
     Read,
     Term,
@@ -61,8 +63,12 @@ def _noun(use: Use) -> Term:
 
 
 def _action(use: Use) -> Term:
-    must_be_agent(use.resolver, use.node, use.scope)
-    return World(ACTION, "action")
+    player = seats.player_before_the_dot(use.resolver, use.node, use.scope)
+    if player is None:
+        must_be_agent(use.resolver, use.node, use.scope)
+        return World(ACTION, "action")
+    # What an NPC does besides, pointing, is no action of a player.
+    return Operation(ACTION, "min", (FieldOf(TURN, player, "last"), Const(ACTION, ACTION.high)))
 
 
 def _did(use: Use) -> Term:
@@ -73,7 +79,13 @@ def _did(use: Use) -> Term:
 
 
 def _poked(use: Use) -> Term:
-    return PokedNow(use.about())
+    what, symbols = use.about(), use.resolver.symbols
+    others = [entity(symbols.numbers[name]) for name in seats.seated(symbols)[1:]]
+    if what == entity(AGENT):  # whom nobody pokes
+        others = []
+    found = any_of((PokedNow(what), *(toggled_by(use, player, what) for player in others)))
+    may_be_agent = bool(others) and AGENT in what.type.values
+    return all_of((found, Compare("!=", what, entity(AGENT)))) if may_be_agent else found
 
 
 def _was_poked(use: Use) -> Term:
@@ -84,11 +96,16 @@ def _was_poked(use: Use) -> Term:
     return FieldOf(BOOL, who, "poked")
 
 
-def toggled_by(who: Const, what: Term) -> Term:
+AGENT: Final = 0
+
+
+def toggled_by(use: Use, who: Const, what: Term) -> Term:
     """Whether the agent toggled at something in this step, or an NPC did so in its last turn."""
-    if who.value == 0:
+    if who.value == AGENT:
         return PokedNow(what)
-    return Compare("==", FieldOf(what.type, who, "toggled"), what)
+    # It may be anything, or nothing, and not only what is asked about.
+    anything = Type("entity", 0, use.resolver.symbols.entities - 1)
+    return Compare("==", FieldOf(anything, who, "toggled"), what)
 
 
 def _toggled_object(use: Use) -> Term:
@@ -102,7 +119,7 @@ def _toggled_object(use: Use) -> Term:
 
 def _toggled(use: Use) -> Term:
     what = _toggled_object(use)
-    return any_of(toggled_by(entity(each), what) for each in range(len(use.resolver.symbols.numbers)))
+    return any_of(toggled_by(use, entity(each), what) for each in range(len(use.resolver.symbols.numbers)))
 
 
 def _toggled_by(use: Use) -> Term:
@@ -111,8 +128,8 @@ def _toggled_by(use: Use) -> Term:
     if who.type.high >= len(use.resolver.symbols.numbers):
         raise use.fail("S211", "`toggled_by` takes a member of the cast", use.args[0])
     if isinstance(who, Const):
-        return toggled_by(who, what)
-    cases = (all_of([Compare("==", who, one), toggled_by(one, what)]) for one in constants(who.type))
+        return toggled_by(use, who, what)
+    cases = (all_of([Compare("==", who, one), toggled_by(use, one, what)]) for one in constants(who.type))
     return where_there_is(who, any_of(cases))
 
 
@@ -179,7 +196,7 @@ HAPPENINGS: Final = (
           also=("says", "say"), meaning=_said),
     Value("spoke", "agent", (), "condition", "the agent said something in this step", momentary=True, meaning=_spoke),
     Value("noun", "agent", (), "noun", "the noun of what it said in this step", momentary=True, meaning=_noun),
-    Value("did", "agent", ("action",), "condition", "the agent's body action in this step", momentary=True,
+    Value("did", "agent", ("action",), "condition", "its body action in this step", momentary=True,
           also=("does",), meaning=_did),
     Value("action", "agent", (), "action", "its body action in this step, or `none`", momentary=True, meaning=_action),
     Value("heard", "member", ("utterance",), "condition", "this NPC heard it since its last turn", momentary=True,

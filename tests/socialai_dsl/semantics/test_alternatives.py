@@ -60,7 +60,7 @@ def test_each_key_of_a_member_has_cases_or_is_the_same_in_all_files(mistakes, fi
         "view": 5, "earshot": "room", "beliefs": "{d: {of: exit.color}}", "accepts": "agent.spoke",
         "audible": "always", "kind_code": 9, "pushed_by": "anybody",
     }  # fmt: skip
-    elsewhere = {"role", "frame", "with", "one_of"}
+    elsewhere = {"role", "seat", "frame", "with", "one_of"}
     fields = CastMember.model_fields
     assert {fields[name].alias or name for name in fields} == {*values, *elsewhere}
     differ = set()
