@@ -272,12 +272,13 @@ def _scenario(loaded: LoadedScenario, data: Mapping[str, Any]) -> Iterator[list[
 
 
 def _cast(loaded: LoadedScenario) -> list[str]:
-    columns = ("who", "role", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
+    columns = ("who", "role", "seat", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
     rows, drawn = [], []
     for key, member in members(loaded.scenario).items():
-        rows.append(_member(member, loaded.scenario.cast[key].role or ""))
+        shared = any(one.seat for one in loaded.scenario.cast.values())
+        rows.append(_member(member, loaded.scenario.cast[key].role or "", shared))
         if member.drawn is not None:
-            rows[-1] = (*rows[-1][:2], "one of the below", "", *rows[-1][4:9], "")
+            rows[-1] = (*rows[-1][:3], "one of the below", "", *rows[-1][5:10], "")
             drawn += ["", f"{code(key)} is one of these, drawn for each episode:", ""]
             raws = [{key: str(one.raw) for key, one in version.items()} for version in member.versions]
             drawn += table(
@@ -290,16 +291,19 @@ def _cast(loaded: LoadedScenario) -> list[str]:
     return [*table(columns, rows), *drawn]
 
 
-def _member(member: Member, role: str) -> tuple[str, ...]:
+def _member(member: Member, role: str, shared: bool) -> tuple[str, ...]:
+    """A row of the cast; `shared`: others than the agent have a seat, so that they see and hear it."""
+
     def given(key: str, default: str = "") -> str:
         return " or ".join(dict.fromkeys(code(case.raw or default) for case in member.cases(key)))
 
     spots = (case.raw or _DEFAULTS["place"] for case in member.cases("at", "place"))
     cells = [f"[{', '.join(map(str, spot))}]" if isinstance(spot, tuple) else spot for spot in spots]
-    agent = member.key == AGENT
+    agent = member.key == AGENT and not shared
     return (
         code(member.key),
         role,
+        "open" if shared and (member.key == AGENT or member.value("seat")) else "",
         "" if agent else str(member.value("kind") or _DEFAULTS["kind"]),
         "" if agent else given("name", Symbols.default_name(member.key)),
         " or ".join(map(code, cells)),
