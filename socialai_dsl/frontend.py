@@ -24,6 +24,7 @@ from socialai_dsl.checking.scenarios import (
     naming_the_patch,
     of_other_values,
     with_findings_on_rivals,
+    with_frames,
     with_rival,
 )
 from socialai_dsl.checking.suites import check_suite
@@ -382,6 +383,20 @@ def closest_script(
         if _is_not_there(error):
             return plain
         raise
+
+
+def following(loaded: LoadedScenario, frames: Mapping[str, str]) -> LoadedScenario:
+    """A scenario in which members of the cast follow other frames of it, by member.
+
+    Raises:
+        ScenarioError: one of them cannot follow its frame.
+    """
+    resolved, bag = with_frames(loaded.resolved, frames), DiagnosticBag()
+    checked, scenario = check_scenario(resolved, bag)
+    bag.raise_errors(resolved.files)
+    assert checked is not None, "internal: it has no mistakes"
+    assert scenario is not None, "internal: it has no mistakes"
+    return LoadedScenario(loaded.name, checked, scenario, resolved)
 
 
 def rival_of(loaded: LoadedScenario, rival: str) -> LoadedScenario:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.analysis.advance import compiled
 from socialai_dsl.analysis.alike import like_first
+from socialai_dsl.analysis.dilemma import schelling
 from socialai_dsl.analysis.effort import Effort, OutOfTimeError
 from socialai_dsl.analysis.facts import RoomFacts
 from socialai_dsl.analysis.guessing import Guess, Guessing, GuessingVerdict
@@ -134,15 +135,18 @@ class Trial:
                 return _only_through(self, plan, effort)
             case "knowable":
                 return _knowable(self, plan, effort)
+            case "dilemma":
+                return _dilemma(self, plan)
 
 
 def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
     """The properties that are tried of a scenario: what it claims, and that its success is knowable.
 
-    An agent that is not to perceive the NPCs is a control: of it nothing is tried that is not claimed.
+    An agent that is not to perceive the NPCs is a control, and a dilemma is about what is paid: of these nothing is
+    tried that is not claimed.
     """
     plans = loaded.checked.properties
-    if loaded.checked.npcs_hidden or any(plan.kind == "knowable" for plan in plans):
+    if loaded.checked.npcs_hidden or any(plan.kind in ("knowable", "dilemma") for plan in plans):
         return plans
     return (*plans, PropertyPlan("knowable", "knowable: true", span))
 
@@ -305,6 +309,14 @@ def _rival(trial: Trial, plan: PropertyPlan) -> Report:
     against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
     solved = dict(enumerate(won.tolist()))
     return Report(verdict, len(won), int((~won).sum()), 0, against, said, len(won), so=solved)
+
+
+def _dilemma(trial: Trial, plan: PropertyPlan) -> Report:
+    """Whether each gains by defecting, and all lose by it."""
+    rooms = trial.effort.rooms
+    found = schelling(trial.loaded, plan.frames, rooms, trial.effort.seed)
+    verdict = Verdict.HOLDS if found.is_dilemma else Verdict.FAILS
+    return Report(verdict, rooms, rooms if found.is_dilemma else 0, 0, (), str(found), rooms)
 
 
 def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

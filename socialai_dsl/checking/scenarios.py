@@ -18,7 +18,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.library import prelude, shared_grammars
-from socialai_dsl.loader.patches import Edit, let_play
+from socialai_dsl.loader.patches import Edit, let_follow, let_play
 from socialai_dsl.loader.reader import read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
@@ -396,6 +396,15 @@ def with_rival(resolved: ResolvedFile, rival: str) -> ResolvedFile:
 
     def change(tree: Node) -> None:
         let_play(tree, rival)
+
+    return resolved.changed(change)
+
+
+def with_frames(resolved: ResolvedFile, frames: Mapping[str, str]) -> ResolvedFile:
+    """A scenario in which members of the cast follow other frames, by member."""
+
+    def change(tree: Node) -> None:
+        let_follow(tree, frames)
 
     return resolved.changed(change)
 

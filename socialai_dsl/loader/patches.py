@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -211,6 +212,17 @@ def let_play(root: Node, rival: str) -> bool:
         str(key): value for key, value in agent.items() if key != "with"
     }  # it fills slots of another
     return True
+
+
+def let_follow(root: Node, frames: Mapping[str, str]) -> None:
+    """Let members of the cast of a scenario follow other frames, by member, which have no slots."""
+    cast = root.entry("cast")
+    assert cast is not None, "internal: a scenario has a cast"
+    for name, frame in frames.items():
+        member = cast.entry(name)
+        assert member is not None, "internal: a member of the cast"
+        kept = {str(key): value for key, value in member.items() if key not in ("with", "frame")}
+        member.children = {**kept, "frame": Node(member.span, frame)}
 
 
 def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:

@@ -45,6 +45,7 @@ CALLED: Final[dict[type, str]] = {
     s.Property: "a property of `check`",
     s.Published: "a published figure",
     s.OnlyThrough: "`only_through`",
+    s.Dilemma: "`dilemma`",
     s.Probe: "a probe",
     s.DialogueTest: "an entry of `tests`",
     s.DialogueRoom: "the room of a test",

@@ -668,9 +668,16 @@ class OnlyThrough(Model):
     by: Names = Field(description="members of the cast whose cues may reveal it")
 
 
+class Dilemma(Model):
+    """Two frames that every seat may follow, by which all together do better than each does for itself."""
+
+    cooperate: FrameName = Field(description="the frame of those who cooperate")
+    defect: FrameName = Field(description="the frame of those who do not")
+
+
 class Property(Model):
-    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `rival`, `needs`, `only_through` and
-    `knowable`.
+    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `rival`, `needs`, `only_through`,
+    `knowable` and `dilemma`.
     """
 
     reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
@@ -695,6 +702,9 @@ class Property(Model):
     knowable: Annotated[bool | None, Hides(True)] = Field(
         None,
         description="whether an agent can perceive in time the draws that its success depends on (tried by default)",
+    )
+    dilemma: Dilemma | None = Field(
+        None, description="of several seats: each gains by defecting whatever others do, and all lose by it"
     )
     share: Probability | None = Field(
         None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"

@@ -176,6 +176,17 @@ class _Entry:
                     hint = cures.add("at_most: 0.67", cures.added(places, place, "at_most: 0.67"))
                     raise self._findings.fail("S105", message, places.key_span(place), hint=hint)
                 return replace(plan, text=f"rival: {name} at most {most:g}", rival=name, share=most)
+            case "dilemma":
+                assert entry.dilemma is not None, "internal: there is a value for this key"
+                written = {"cooperate": entry.dilemma.cooperate, "defect": entry.dilemma.defect}
+                frames = tuple(self._frame((*place, key), name) for key, name in written.items())
+                if len(seats.seated(self._resolver.symbols)) == 1:
+                    message = "a dilemma is one of several players, and only the agent has a seat"
+                    hint = "give one to another member of the cast: `seat: open`"
+                    raise self._findings.fail(
+                        "S107", message, self._findings.places.key_span(place), hint=hint
+                    )
+                return replace(plan, text=f"dilemma: {frames[0]} or {frames[1]}", frames=frames)
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (
@@ -203,6 +214,8 @@ class _Entry:
         asked = getattr(entry, kind)
         if kind == "needs":
             asked = ", ".join(asked)
+        elif entry.dilemma is not None:
+            asked = f"{entry.dilemma.cooperate} or {entry.dilemma.defect}"
         elif entry.only_through is not None:
             asked = f"{entry.only_through.draw} by {', '.join(entry.only_through.by)}"
         why = ", ".join(reason.message for reason in reasons)
@@ -244,6 +257,17 @@ class _Entry:
                 raise self._findings.no_such(name, message, span, suggestion=near)
             members += symbols.groups.get(name, (name,))
         return tuple(dict.fromkeys(members))
+
+    def _frame(self, path: DataPath, name: str) -> str:
+        """A frame that anybody can follow, since it has no slots."""
+        frames, span = self._resolver.symbols.scenario.frames, self._findings.at(path, width=len(name))
+        if name not in frames:
+            near = did_you_mean(name, frames)
+            raise self._findings.no_such(name, f"unknown frame `{name}`", span, suggestion=near)
+        if frames[name].slots:
+            message = f"frame `{name}` has slots, which not every seat fills"
+            raise self._findings.fail("S204", message, span, hint="name a frame without slots")
+        return name
 
     def _rival(self, path: DataPath, name: str) -> str:
         rivals = self._resolver.symbols.scenario.rivals
@@ -615,6 +639,8 @@ class _Run:
         ]
         followed = {frame.name for frame in self._played.values()}
         followed.update(str(role.frame) for role in scenario.roles.values())
+        dilemmas = [claim.dilemma for claim in scenario.check if claim.dilemma is not None]
+        followed.update(name for one in dilemmas for name in (one.cooperate, one.defect))
         idle: list[DataPath] = [("frames", key) for key in scenario.frames if key not in followed]
         parts: list[DataPath] = [(name,) for name in scenario.model_fields_set]
         if len({places.key_span(path).file for path in (*parts, *paths, *idle)}) > 1:

@@ -444,7 +444,7 @@ class MemoryPlan:
 
 
 PropertyKind = Literal[
-    "reachable", "never", "within", "oracle", "script", "rival", "needs", "only_through", "knowable"
+    "reachable", "never", "within", "oracle", "script", "rival", "needs", "only_through", "knowable", "dilemma"
 ]  # fmt: skip
 
 
@@ -457,6 +457,7 @@ class PropertyPlan:
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
     `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
     what success depends on is to be `knowable`, or not to be. `rival`: whose share of rooms is at most `share`.
+    `frames`: of `dilemma`, of those who cooperate and of those who defect.
     `unasked`: why there is nothing to try: what a patch fixed or took away.
     """
 
@@ -472,6 +473,7 @@ class PropertyPlan:
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
     expected: bool = True
     rival: str = ""
+    frames: tuple[str, ...] = ()
     unasked: str = ""
 
 

@@ -53,6 +53,7 @@ BEYOND = {
     "novel/second_order": 3,
     "novel/turn_taking": 2,
     "novel/whisper": 3,
+    "together/commons_together": 1,  # a dilemma, of which nothing is to be known
 }
 
 CLAIMING_NOTHING = [
