@@ -44,10 +44,16 @@ from socialai_dsl.vocabulary import spelt
 
 @dataclass
 class Recording:
-    """A moment, and the actions of all seats since then, int64 (S, heads) as bytes each."""
+    """A moment, and what all seats have done since then.
+
+    Attributes:
+        actions: of each step, int64 (S, heads) as bytes.
+        taken: of each step, on which seats somebody sat, bool (S,); empty where the agent plays alone.
+    """
 
     start: Start
     actions: list[bytes] = field(default_factory=list)
+    taken: list[NDArray[np.bool_]] = field(default_factory=list)
 
 
 # -- who or what stands in the way ---------------------------------------------------------------------------
@@ -165,7 +171,7 @@ class Explainer:
         program: what the environment plays. scenario: what it was compiled from.
         suite: the suite it is a member of, None if it plays alone.
         number: which member it is.
-        taken: on which of the seats that the environment plays somebody sits, bool (S,).
+        seats: how many seats the environment plays.
     """
 
     def __init__(
@@ -174,13 +180,12 @@ class Explainer:
         scenario: CheckedScenario,
         suite: ProgramSuite | None,
         number: int,
-        taken: NDArray[np.bool_],
+        seats: int,
     ) -> None:
         self._checked = scenario
         self._program = program
         self._noting = compile_noting(scenario)
-        self._table = Table([_alone(self._noting.program, suite, number)], 1, all_seats=len(taken) > 1)
-        self._table.set_taken(taken)
+        self._table = Table([_alone(self._noting.program, suite, number)], 1, all_seats=seats > 1)
         self._table.reset(0, None)
 
     def explain(self, recording: Recording, reached: NDArray[np.int32] | None) -> dict[str, Any]:
@@ -212,7 +217,9 @@ class Explainer:
         state.boards[0] = start.board[: state.boards.shape[1]]
         state.tokens[:] = 0
         before = batch.counters.copy()
-        for action in recording.actions:
+        for step, action in enumerate(recording.actions):
+            if recording.taken:
+                batch.ports.taken[:] = recording.taken[step]
             state.registers[0, self._noting.first :] = 0
             before = batch.counters.copy()
             batch.ports.actions[:] = np.frombuffer(action, np.int64).reshape(batch.ports.actions.shape)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,23 +27,24 @@ from socialai_dsl.render.gestures import Gesture, gestures_of
 from socialai_dsl.render.grid import draw_ansi, draw_grid, figures, own_hands
 from socialai_dsl.render.marks import Marks, marks_of
 from socialai_dsl.render.panel import Face
-from socialai_dsl.render.tiles import NPC, Code, draw_tile
+from socialai_dsl.render.tiles import EMPTY, NPC, Code, draw_tile
 
 _DOWN = 1
+_GROUND = (EMPTY, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The content of a picture of the room.
+    """The content of a picture of the room, for one of the seats.
 
     Attributes:
-        codes: uint8 (H, W, 4), each cell's type, colour, status and orientation.
-        agent: x, y, direction.
-        seen: bool (H, W), the cells in the agent's field of view.
+        codes: uint8 (H, W, 4), each cell's type, colour, status and orientation, without who has the seat.
+        agent: x, y, direction of who has the seat.
+        seen: bool (H, W), the cells in its field of view.
         below: (x, y) -> the object in whose cell an NPC stands.
         gestures: (x, y) -> where the NPC there points and what it did last.
-        held: (x, y) -> what the agent or the NPC there carries, as far as the agent sees it.
-        marks: (x, y) -> the looks of what is seen there; where the agent stands, of what it carries.
+        held: (x, y) -> what who has the seat or the NPC there carries, as far as the former sees it.
+        marks: (x, y) -> the looks of what is seen there; where who has the seat stands, of what it carries.
     """
 
     codes: NDArray[np.uint8]
@@ -55,55 +57,82 @@ class Scene:
 
     @property
     def own(self) -> Code | None:
-        """What the agent carries."""
+        """What who has the seat carries."""
         return self.held.get(self.agent[:2])
 
     @property
     def own_words(self) -> list[str]:
-        """A line on what the agent carries, if it carries something."""
+        """A line on what it carries, if it carries something."""
         own, place = self.own, self.agent[:2]
         return [] if own is None else [own_hands(own, self.marks.get(place, ()))]
 
 
-def scene(table: Table, row: int) -> Scene:
-    """The scene of a row of the table."""
-    codes, agent = table.cells(row)
+def scene(table: Table, row: int, seat: int = 0) -> Scene:
+    """The scene of a row of the table for a seat, to which the agent is a member like the others."""
+    own = table.member_at(row, seat)
+    fields = _fields(table, row)
+    pose = _pose(fields[own])
+    codes, below = table.cells(row), _under_npcs(table, row, own)
+    if own:
+        _show_agent(table, row, codes, pose, below)
     width, height = table.room(row)
+    gestures = gestures_of(table.program(row), table.state.registers[row])
     return Scene(
         codes[:height, :width],
-        agent,
-        _seen(table, row, agent)[:height, :width],
-        _under_npcs(table, row),
-        gestures_of(table.program(row), table.state.registers[row]),
-        _held(table, row, agent),
-        _marks(table, row, codes, agent),
+        pose,
+        _seen(table, row, pose)[:height, :width],
+        {place: look for place, look in below.items() if place != pose[:2]},
+        {place: gesture for place, gesture in gestures.items() if own == 0 or place != pose[:2]},
+        _held(table, row, own),
+        _marks(table, row, codes, own),
     )
 
 
-def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
+def _pose(fields: NDArray[np.int32]) -> tuple[int, int, int]:
+    return int(fields[Field.X]), int(fields[Field.Y]), int(fields[Field.DIR])
+
+
+def _show_agent(
+    table: Table,
+    row: int,
+    codes: NDArray[np.uint8],
+    own: tuple[int, int, int],
+    below: Mapping[tuple[int, int], Code],
+) -> None:
+    """Show the agent among the NPCs, and what lies under who has the seat in its place."""
+    program, agent = table.program(row), _fields(table, row)[0]
+    x, y, _ = own
+    if x >= 0 and codes[y, x, 0] == NPC:
+        codes[y, x] = below.get((x, y), _GROUND)
+    place = int(agent[Field.X]), int(agent[Field.Y])
+    if place[0] >= 0 and not agent[Field.GONE] and not program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
+        kind = program.table(Header.ENTITY_AT)[0, EntityColumn.KIND]
+        codes[place[1], place[0]] = NPC, agent[Field.COLOR], kind, agent[Field.DIR]
+
+
+def frame(table: Table, row: int, mode: str, tile: int = 32, seat: int = 0) -> Any:
     """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
-    shown = scene(table, row)
+    shown = scene(table, row, seat)
     if mode == "ansi":
         told = figures(shown.codes, shown.gestures, held=shown.held, marks=shown.marks)
-        return "\n".join([plain_text(table, row), *told, *shown.own_words])
+        return "\n".join([draw_ansi(shown.codes, shown.agent), *told, *shown.own_words])
     things = shown.below, shown.gestures, shown.held, shown.marks
     return draw_grid(shown.codes, shown.agent, shown.seen, tile, *things)
 
 
 def plain_text(table: Table, row: int) -> str:
     """The room as text, without a word on what the letters do not say."""
-    codes, agent = table.cells(row)
-    width, height = table.room(row)
-    return draw_ansi(codes[:height, :width], agent)
+    found = scene(table, row)
+    return draw_ansi(found.codes, found.agent)
 
 
-def coloured_text(table: Table, row: int) -> str:
-    """The room as text with escape codes for colours, what the agent has in view on a lighter ground.
+def coloured_text(table: Table, row: int, seat: int = 0) -> str:
+    """The room as text with escape codes for colours, what is in view from a seat on a lighter ground.
 
-    Where the scenario shows its agent gestures, lines below the room say who points and who did what last; where it
+    Where the scenario shows players gestures, lines below the room say who points and who did what last; where it
     shows hands, who carries what; where it shows looks, what has which.
     """
-    found = scene(table, row)
+    found = scene(table, row, seat)
     shown = {place: gesture for place, gesture in found.gestures.items() if gesture.words}
     told = figures(found.codes, shown, {**shown, **found.held}, found.held, found.marks)
     told += found.own_words
@@ -140,8 +169,11 @@ def _fields(table: Table, row: int) -> NDArray[np.int32]:
     return table.state.registers[row, FIRST_ENTITY:][: ENTITY_FIELDS * count].reshape(-1, ENTITY_FIELDS)
 
 
-def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
-    """(x, y) -> the object in whose cell an NPC stands and is drawn; a cell of the canvas shows one of them."""
+def _under_npcs(table: Table, row: int, own: int) -> dict[tuple[int, int], Code]:
+    """(x, y) -> the object in whose cell an NPC stands and is drawn; a cell of the canvas shows one of them.
+
+    For a member other than the agent, the agent is one of them.
+    """
     program = table.program(row)
     if program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
         return {}
@@ -152,7 +184,7 @@ def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
         if entity[Field.X] >= 0 and not entity[Field.GONE]
     }
     roles = [entity.role for entity in program.entities]
-    npcs = {place for number, place in present.items() if roles[number] == "npc"}
+    npcs = {place for number, place in present.items() if roles[number] == "npc" or (own and number == 0)}
     return {
         place: _look(program, number, fields[number])
         for number, place in present.items()
@@ -160,8 +192,8 @@ def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
     }
 
 
-def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int, int], Code]:
-    """(x, y) -> what is in the hands of the member there: of NPCs its type and colour, where the agent sees them."""
+def _held(table: Table, row: int, own: int) -> dict[tuple[int, int], Code]:
+    """(x, y) -> what is in the hands of the member there: of others its type and colour, where players see them."""
     program = table.program(row)
     flags = program.header(Header.FLAGS)
     if not flags & Flag.CARRYING:
@@ -175,17 +207,15 @@ def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int
             continue
         look = _look(program, number, thing)
         who = fields[carrier]
-        if carrier == 0:
-            found[agent[:2]] = look
+        if carrier == own:
+            found[_pose(who)[:2]] = look
         elif shown and who[Field.X] >= 0 and not who[Field.GONE]:
             found.setdefault((int(who[Field.X]), int(who[Field.Y])), (*look[:2], 0, 0))
     return found
 
 
-def _marks(
-    table: Table, row: int, codes: NDArray[np.uint8], agent: tuple[int, int, int]
-) -> dict[tuple[int, int], Marks]:
-    """(x, y) -> the looks of what is seen there; where the agent stands, of what it carries."""
+def _marks(table: Table, row: int, codes: NDArray[np.uint8], own: int) -> dict[tuple[int, int], Marks]:
+    """(x, y) -> the looks of what is seen there; where a member with a seat stands itself, of what it carries."""
     program, registers = table.program(row), table.state.registers[row]
     if not program.looks:
         return {}
@@ -193,17 +223,19 @@ def _marks(
     words, found = dict(program.looks), dict[tuple[int, int], Marks]()
     roles = [entity.role for entity in program.entities]
     things = [number for number, role in enumerate(roles) if role == "object"]
-    npcs = [number for number, role in enumerate(roles) if role == "npc"]
+    npcs = [number for number, role in enumerate(roles) if role == "npc" and number != own]
+    npcs = [0, *npcs] if own else npcs
+    here = _pose(fields[own])[:2]
     # Of several in a cell the last object is seen, and the first NPC before all objects.
     for number in (*things, *reversed(npcs)):
         entity = fields[number]
         place = int(entity[Field.X]), int(entity[Field.Y])
-        carried = roles[number] == "object" and entity[Field.CARRIER] == 1
-        away = place[0] < 0 or entity[Field.GONE] or place == agent[:2]
+        carried = roles[number] == "object" and entity[Field.CARRIER] == 1 + own
+        away = place[0] < 0 or entity[Field.GONE] or place == here
         if not carried and (away or (codes[place[1], place[0], 0] == NPC) != (number in npcs)):
             continue
         shown = (int(registers[one]) if one else NO_GESTURE for one in program.look_table[number])
-        found[agent[:2] if carried else place] = marks_of(words, shown)
+        found[here if carried else place] = marks_of(words, shown)
     return {place: marks for place, marks in found.items() if marks}
 
 
@@ -219,11 +251,11 @@ def _look(program: Program, number: int, entity: NDArray[np.int32]) -> Code:
     )
 
 
-def _seen(table: Table, row: int, agent: tuple[int, int, int]) -> NDArray[np.bool_]:
-    """Which cells of the canvas lie in the agent's field of view, bool (H, W)."""
+def _seen(table: Table, row: int, pose: tuple[int, int, int]) -> NDArray[np.bool_]:
+    """Which cells of the canvas lie in the field of view of a member with this x, y, direction, bool (H, W)."""
     program = table.program(row)
     width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
-    x, y, direction = agent
+    x, y, direction = pose
     ys, xs = np.mgrid[:height, :width]
     dx, dy = xs - x, ys - y
     ahead_x, ahead_y = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction]

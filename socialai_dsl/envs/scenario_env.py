@@ -17,16 +17,26 @@ from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.explain import Explainer, Recording
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
-from socialai_dsl.envs.seats import Company, Seats
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.seats import Company, SeatMoment, Seats, require_seat
+from socialai_dsl.envs.table import Table, heard_at
 from socialai_dsl.envs.values import whole_number
 from socialai_dsl.envs.view import View
-from socialai_dsl.program import FIRST_ENTITY, EntityName, Field, Flag, Header, Register
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    LOOKS,
+    VIEW,
+    EntityName,
+    Field,
+    Flag,
+    Header,
+    Register,
+)
 from socialai_dsl.program_suite import Playable, ProgramSuite, words_of_looks
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.vocabulary import Sentences, Slot
+from socialai_dsl.vocabulary import TURN_WORDS, Sentences, Slot
 
 Live = tuple[frozenset[int], ...]
 """Indices of templates, and of the words of each slot, that are meant where a word stands for several."""
@@ -120,7 +130,6 @@ def _sentence(given: Any, sentences: Sentences, live: Live) -> tuple[int, ...]:
 Observation = dict[str, NDArray[Any]]
 
 SILENCE = "NA"
-_HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
 _INT64 = np.dtype(np.int64)
 
 
@@ -192,6 +201,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         self._ended = True
         self._act = 0
         self.playing = self._table.program(0)
+        self._heard = heard_at(self.playing, self._player)[0]
         self._always: dict[str, Any] = {}
         self._recording = Recording(self._table.start(0))
         self._last_act: Recording | None = None
@@ -287,12 +297,14 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         if ended < 0:
             raise self._table.batch.refused_room() if ended != BAD_ACTION else self._refusal(action)
         self._recording.actions.append(words)
+        if self._company is not None:
+            self._recording.taken.append(self._table.batch.ports.taken.copy())
         if self._acts:
             self._turn_over()
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
         if self._always:
             info |= self._always
-        if self._numbers[_HEARD]:
+        if self._numbers[self._heard]:
             self._history = "\n".join(self._table.history(self._player))
             info |= {"utterance": "\n".join(self._table.heard(self._player)), "history": self._history}
         terminated = truncated = False
@@ -333,6 +345,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         """Look up which program this episode plays."""
         self._act = self._key[Key.ACT]
         self.playing = self._table.program(0)
+        self._heard = heard_at(self.playing, self._player)[0]
         self._always = {"member": self._table.member(0)} if self._suite else {}
 
     def _converted(self, action: Any, given: NDArray[Any]) -> NDArray[np.int64]:
@@ -371,6 +384,60 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         scripted: NDArray[np.int64] = self._table.scripted_actions()[0]
         return scripted
+
+    @property
+    def seats(self) -> tuple[str, ...]:
+        """The members of the cast whose seats are played here, the agent first: the agent alone without `seats`."""
+        return tuple(map(str, self.playing.seats))[: self._table.seats]
+
+    def seat_moment(self, seat: str) -> SeatMoment:
+        """What a seat got in the last step, and what was done there.
+
+        Raises:
+            ValueError: there was no reset yet, or there is no such seat.
+        """
+        self._table.look("seat_moment")
+        number, table, ports = self._seat_number(seat), self._table, self._table.batch.ports
+        began = not self._recording.actions
+        # A script plays by itself, so what it did is known from its body alone.
+        sat = not began and bool(ports.taken[number])
+        action = ports.actions[number].copy() if sat else None
+        last = self._registers[FIRST_ENTITY + ENTITY_FIELDS * table.member_at(0, number) + Field.LAST]
+        did = TURN_WORDS[last] if action is None else (*self.program.actions, "none")[action[0]]
+        return SeatMoment(
+            {"image": table.image[number].copy(), "tokens": table.tokens[number].copy()},
+            {
+                "utterance": "\n".join(table.heard(number)) or SILENCE,
+                "history": "\n".join(table.history(number)),
+            },
+            action,
+            None if began else did,
+            0.0 if began else float(ports.reward[number]),
+            bool(ports.success[number]) if self._ended and not began else None,
+        )
+
+    def fill_seat(self, seat: str, partner: Any) -> None:
+        """Let somebody else than before fill a seat from the next step on, also over resets.
+
+        Args:
+            seat: of another member than the caller's.
+            partner: as in `seats`.
+
+        Raises:
+            ValueError: there is no such seat or player, or the caller has it; or the environment was made without
+                `seats`.
+        """
+        if self._company is None:
+            raise ValueError(
+                "fill_seat: got an environment of the agent alone; expected one made with `seats`"
+            )
+        self._company.seat(seat, partner)
+
+    def _seat_number(self, seat: str | None) -> int:
+        if seat is None:
+            return self._player
+        require_seat(seat, self.seats)
+        return self.seats.index(seat)
 
     def describe(self) -> dict[str, Any]:
         """The state in the scenario's own names, as a layout that `reset` accepts."""
@@ -414,8 +481,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         scenario = self._scenario(number)
         if program.sha256 not in self._explainers:
             suite = self.program if isinstance(self.program, ProgramSuite) else None
-            taken = self._table.batch.ports.taken
-            self._explainers[program.sha256] = Explainer(program, scenario, suite, number, taken)
+            self._explainers[program.sha256] = Explainer(program, scenario, suite, number, self._table.seats)
         # Where another act has begun, the registers are that one's.
         reached = self._registers if self._last_act is None else None
         return self._explainers[program.sha256].explain(recording, reached)
@@ -454,13 +520,18 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             return None
         self._table.look("render")
         if self.render_mode == "rgb_array":
-            return frame(self._table, 0, "rgb_array")
-        text = frame(self._table, 0, "ansi")
+            return frame(self._table, 0, "rgb_array", seat=self._player)
+        text = frame(self._table, 0, "ansi", seat=self._player)
         if self.render_mode == "ansi":
             return text
         heard = "\n".join(self._table.heard(self._player))
         print(f"{text}\n{heard}\n")
         return None
+
+    @property
+    def seat_names(self) -> tuple[str, ...]:
+        """The one member of the cast that the caller plays, as `ScenarioVectorEnv.seat_names` has several."""
+        return (str(self.playing.seats[self._player]),)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -478,20 +549,25 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         return plain_text(self._table, 0)
 
     def coloured_text(self) -> str:
-        """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""
+        """The room as text with escape codes for colours; what the caller's member has in view has a lighter ground."""
         self._table.look("coloured_text")
-        return coloured_text(self._table, 0)
+        return coloured_text(self._table, 0, self._player)
 
-    def view(self, image: NDArray[np.uint8]) -> View:
-        """The image of the present observation as a player sees it."""
-        facing = int(self._registers[FIRST_ENTITY + Field.DIR])
+    def view(self, image: NDArray[np.uint8], seat: str | None = None) -> View:
+        """The image of the present observation as a player sees it, by default from the caller's seat."""
+        number = self._seat_number(seat)
+        own = self._table.member_at(0, number)
+        if number:  # the number of the seat stands there, see `one_step.md`
+            image = image.copy()
+            image[VIEW // 2, VIEW - 1, LOOKS.index("orientation")] = 0
+        facing = int(self._registers[FIRST_ENTITY + ENTITY_FIELDS * own + Field.DIR])
         egocentric = bool(self.playing.header(Header.FLAGS) & Flag.EGOCENTRIC)
         return View(image, facing, egocentric, self.channels, self.looks)
 
-    def scene(self) -> Scene:
-        """The content of a picture of the room now."""
+    def scene(self, seat: str | None = None) -> Scene:
+        """The content of a picture of the room now, by default from the caller's seat."""
         self._table.look("scene")
-        return scene(self._table, 0)
+        return scene(self._table, 0, self._seat_number(seat))
 
     def looks_of_npcs(self) -> dict[EntityName, Code]:
         """The look of each NPC, as if it looked down; also of those that have left or are hidden."""

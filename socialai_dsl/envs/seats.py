@@ -32,6 +32,27 @@ class Partner(Protocol):
         """Choose actions, int64 (E, heads), given `image` and `tokens` of E games."""
 
 
+@dataclass(frozen=True, eq=False)
+class SeatMoment:
+    """What a seat got in the last step, and what was done there.
+
+    Attributes:
+        observation: `image` and `tokens`, as `ScenarioEnv` gives them.
+        info: `utterance` and `history`, as it hears them.
+        action: int64 (heads,), of the player there; None before the first step, and where nobody sat.
+        did: the word for what its body did; None before the first step.
+        reward: of the step; 0 before the first one.
+        success: whether the episode was its success; None until it has ended.
+    """
+
+    observation: dict[str, NDArray[Any]]
+    info: dict[str, str]
+    action: NDArray[np.int64] | None
+    did: str | None
+    reward: float
+    success: bool | None
+
+
 @dataclass(frozen=True)
 class Seats:
     """The seats of a game.
@@ -70,9 +91,7 @@ class Seats:
             raise ValueError(f"seats: got {seating!r}; expected {expected}")
         names = tuple(map(str, programs[0].seats))
         for name, partner in seating.items():
-            if name not in names:
-                near = suggested(str(name), names, quoted=repr)
-                raise ValueError(f"seats: got {name!r}; expected one of {', '.join(names)}{near}")
+            require_seat(name, names)
             _check_partner(str(name), partner, programs)
         # Whoever is not named is the caller's, or if that is said of nobody in particular the agent is.
         free = [name for name in names if name not in seating]
@@ -83,6 +102,13 @@ class Seats:
         own = 0 if names[0] in free else names.index(free[0])
         partners = {number: seating.get(name, SCRIPT) for number, name in enumerate(names) if number != own}
         return cls(names, own, partners)
+
+
+def require_seat(name: Any, names: Sequence[str]) -> None:
+    """See that a seat is one of these. Raises ValueError."""
+    if name not in names:
+        near = suggested(str(name), names, quoted=repr)
+        raise ValueError(f"seats: got {name!r}; expected one of {', '.join(names)}{near}")
 
 
 def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None:
@@ -105,17 +131,31 @@ class Company:
 
     def __init__(self, seats: Seats, table: Table) -> None:
         self._seats, self._table = seats, table
+        self._partners = dict(seats.partners)
         self._sizes = table.merged.action_space().nvec.astype(np.uint64)
         self._sites = [np.uint64(draws.site(f"seats.{name}")) for name in seats.names]
-        self._asks_script = _is(seats.partners.get(0), SCRIPT)
-        scripted = [number for number, partner in seats.partners.items() if number and _is(partner, SCRIPT)]
-        taken = np.ones((table.rows, len(seats.names)), np.bool_)
-        taken[:, scripted] = False  # these play by themselves
-        table.set_taken(taken.reshape(-1))
+        self._sit()
+
+    def seat(self, name: str, partner: Any) -> None:
+        """Let somebody else than before fill a seat from the next step on. Raises ValueError as `Seats.of` does."""
+        require_seat(name, self._seats.names)
+        number = self._seats.names.index(name)
+        if number == self._seats.own:
+            raise ValueError(f"seats: got {name!r}, whose actions are those of `step`; expected another one")
+        _check_partner(name, partner, self._table.programs)
+        self._partners[number] = partner
+        self._sit()
+
+    def _sit(self) -> None:
+        """Leave the seats on which scripts play by themselves; the agent's is always taken."""
+        scripted = [number for number, partner in self._partners.items() if number and _is(partner, SCRIPT)]
+        taken = np.ones((self._table.rows, len(self._seats.names)), np.bool_)
+        taken[:, scripted] = False
+        self._table.set_taken(taken.reshape(-1))
 
     def begin(self, games: NDArray[np.bool_]) -> None:
         """Episodes have begun in some games, bool (E,)."""
-        for partner in self._seats.partners.values():
+        for partner in self._partners.values():
             if not isinstance(partner, str):
                 partner.reset(games)
 
@@ -124,13 +164,13 @@ class Company:
         count, table = len(self._seats.names), self._table
         actions = np.zeros((table.rows, count, len(self._sizes)), np.int64)
         actions[:, self._seats.own] = own
-        for number, partner in self._seats.partners.items():
+        for number, partner in self._partners.items():
             if _is(partner, RANDOM):
                 actions[:, number] = self._drawn(number)
             elif not isinstance(partner, str):
                 image, tokens = table.image[number::count].copy(), table.tokens[number::count].copy()
                 actions[:, number] = partner.act({"image": image, "tokens": tokens})
-        if self._asks_script:
+        if _is(self._partners.get(0), SCRIPT):
             actions[:, 0] = table.scripted_actions()
         return actions.reshape(table.players, -1)
 

@@ -24,10 +24,8 @@ from socialai_dsl.envs.options import each, reset_options
 from socialai_dsl.envs.starts import Starts
 from socialai_dsl.envs.values import whole_number, word
 from socialai_dsl.program import (
-    FIRST_ENTITY,
     LOOKS,
     VIEW,
-    Field,
     Flag,
     FrameColumn,
     Header,
@@ -553,13 +551,15 @@ class Table(Copied):
         spoiled = {"spoiled": True} if self.state.keys[row, Key.SPOILED] else {}
         return {"member": member, **spoiled, **described}
 
-    def cells(self, row: int) -> tuple[NDArray[np.uint8], tuple[int, int, int]]:
-        """The canvas as it looks, uint8 (H, W, 4), and the agent's x, y, direction."""
-        program, registers = self.program(row), self.state.registers[row]
+    def cells(self, row: int) -> NDArray[np.uint8]:
+        """The canvas as it looks without the agent, uint8 (H, W, 4)."""
+        program = self.program(row)
         width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
-        codes = self.state.boards[row, : width * height].copy().view(np.uint8).reshape(height, width, 4)
-        pose = (int(registers[FIRST_ENTITY + field]) for field in (Field.X, Field.Y, Field.DIR))
-        return codes, tuple(pose)  # type: ignore[return-value]
+        return self.state.boards[row, : width * height].copy().view(np.uint8).reshape(height, width, 4)
+
+    def member_at(self, row: int, seat: int) -> int:
+        """The number of the member of the cast that has a seat, as an entity; the agent's is 0."""
+        return int(self.program(row).seat_table[seat - 1, SeatColumn.ENTITY]) if seat else 0
 
     def room(self, row: int) -> tuple[int, int]:
         """Width and height of the room."""

@@ -2,15 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.episodes.play import AGENT, Bools, Int64, Rooms, Seat, Step
-from socialai_dsl.episodes.policies import Observation
+from socialai_dsl.episodes.play import AGENT, Bools, Int64, Observer, Rooms, Seat, Step
+from socialai_dsl.episodes.policies import Observation, Policy
+
+
+class Remembering:
+    """A policy on a seat of one room that can be taken back to an earlier step, what it draws included.
+
+    Args:
+        policy: what plays.
+
+    Attributes:
+        episode: a number on which what it draws in the next episode depends.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+        self.episode = 0
+        self._seen: list[Observation] = []
+
+    def reset(self, mask: Bools, episodes: Int64 | None = None) -> None:
+        """See `Policy.reset`."""
+        self._policy.reset(np.ones(1, np.bool_), np.array([self.episode]))
+        self._seen = []
+
+    def act(self, observation: Observation) -> Any:
+        """See `Policy.act`."""
+        self._seen.append(observation)
+        return self._policy.act(observation)
+
+    def back(self, steps: int) -> None:
+        """Be as after this number of steps."""
+        if len(self._seen) > steps:
+            seen = self._seen[:steps]
+            self.reset(np.ones(1, np.bool_))
+            for observation in seen:
+                self.act(observation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,16 +67,30 @@ class StageMoment:
 class Stage(Rooms):
     """A room with every step back to its start.
 
+    Args:
+        env: what `make` returns.
+        observers: are told of all that happens.
+        partners: policies that play other seats in it.
+
     Attributes:
         moments: the start, and one for each step.
     """
 
     moments: list[StageMoment]
 
+    def __init__(
+        self, env: Any, observers: Sequence[Observer] = (), partners: Iterable[Remembering] = ()
+    ) -> None:
+        super().__init__(env, observers)
+        self._partners = tuple(partners)
+
     def begin(
         self, reset: Mapping[str, Any], numbers: Int64 | None = None, begun: Bools | None = None
     ) -> None:
         """See `Rooms.begin`."""
+        options = reset.get("options") or {}
+        for partner in self._partners:
+            partner.episode = int(reset.get("seed") or options.get("test_episode") or 0)
         super().begin(reset, numbers, begun)
         self.moments = [self._now()]
 
@@ -51,7 +99,7 @@ class Stage(Rooms):
         try:
             step = super().step(actions)
         except Exception:
-            self.env.restore(self.moments[-1].snapshot)
+            self._restore()
             raise
         self.moments.append(self._now())
         return step
@@ -61,8 +109,8 @@ class Stage(Rooms):
         if self.steps == 0:
             return False
         self.moments.pop()
+        self._restore()
         now = self.moments[-1]
-        self.env.restore(now.snapshot)
         self.observations, self.info, self.running = now.observations, now.info, now.running
         for observer in self.observers:
             observer.back(self)
@@ -72,12 +120,18 @@ class Stage(Rooms):
         """Play a step that nobody sees, `look` at what came of it, and take it back; it prepares the first one."""
         self.env.step(actions[AGENT][0])
         look()
-        self.env.restore(self.moments[-1].snapshot)
+        self._restore()
 
     @property
     def steps(self) -> int:
         """How many steps were played."""
         return len(self.moments) - 1
+
+    def _restore(self) -> None:
+        """Let the environment and the partners be as they are now on the stage."""
+        self.env.restore(self.moments[-1].snapshot)
+        for partner in self._partners:
+            partner.back(self.steps)
 
     def _now(self) -> StageMoment:
         return StageMoment(self.env.snapshot(), self.observations, self.info, self.running)

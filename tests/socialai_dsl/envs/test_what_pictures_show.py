@@ -90,7 +90,7 @@ def in_the_room(look: Look, own: int, egocentric: bool) -> Look:
 
 def looks(env: ScenarioEnv, image: NDArray[np.uint8]) -> Iterator[tuple[int, int, Look]]:
     """Column, row and channels of each cell that the agent sees; its own shows what it carries."""
-    _, (x, y, own) = env._table.cells(0)
+    x, y, own = env.scene().agent
     width, height = env._table.room(0)
     # A cell that is pointed at is shown by a line across the room.
     own_channels = [k for k, name in enumerate(env.channels) if name not in GESTURES[2:]]
