@@ -80,6 +80,27 @@ def add_participant(parser: argparse.ArgumentParser, whose: str = "") -> None:
     )
 
 
+def add_seats(parser: argparse.ArgumentParser) -> None:
+    """Declare who sits on other seats than the one who plays."""
+    parser.add_argument(
+        "--seat",
+        action="append",
+        type=seat_and_player,
+        default=[],
+        metavar="NAME=PLAYER",
+        help="who plays a member of the cast with a seat: script, random, a run, a checkpoint or shipped:NAME "
+        "(repeatable); the one who plays has the first seat that is left",
+    )
+
+
+def seat_and_player(text: str) -> tuple[str, str]:
+    """`helper=runs/x` as a pair."""
+    seat, equals, player = text.partition("=")
+    if not (seat and equals and player):
+        raise argparse.ArgumentTypeError(f"got {_short(text)}, expected NAME=PLAYER, such as helper=script")
+    return seat, player
+
+
 def add_tell(parser: argparse.ArgumentParser) -> None:
     """Declare what players are told before the first observation."""
     group = parser.add_argument_group(

@@ -8,6 +8,7 @@ from typing import Any, Final
 from socialai_dsl.cli.arguments import (
     TELL_OPTIONS,
     add_participant,
+    add_seats,
     add_tell,
     episodes,
     natural,
@@ -97,6 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="number of episodes in a row that the agent remembers, with results by trial (default: 1)",
     )
+    add_seats(parser)
     add_participant(parser, "for the agent human: ")
     parser.add_argument(
         "--view",
@@ -120,7 +122,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     player = made_player(agent, scenarios, typed_options(arguments, _OPTIONS), out)
     recorded = RECORDED if arguments.record is None else arguments.record
     results = []
-    for evaluation in evaluate_each(player, scenarios, arguments.episodes, recorded, out, arguments.trials):
+    asked = arguments.episodes, recorded, out, arguments.trials, arguments.seat
+    for evaluation in evaluate_each(player, scenarios, *asked):
         results.append(result_of(evaluation))
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
@@ -136,10 +139,18 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _table(evaluation: Evaluation, figures: dict[str, Any]) -> str:
     parts = [
-        [f"{evaluation.scenario}, agent {evaluation.player.agent}"],
+        [", ".join((evaluation.scenario, f"agent {evaluation.player.agent}", *_company(evaluation)))],
         aligned(summary_rows(figures)),
         probe_lines(figures),
         ending_lines(figures),
         rule_lines(figures),
     ]
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def _company(evaluation: Evaluation) -> list[str]:
+    """Who sat where, if anybody was named."""
+    if not evaluation.partners:
+        return []
+    partners = [f"{seat} by {player.agent}" for seat, player in evaluation.partners.items()]
+    return [f"on the seat of {evaluation.seat}", *partners]

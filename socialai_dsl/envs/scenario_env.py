@@ -377,12 +377,12 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         return encode_action(action, self.program.actions, self.program.sentences, live)
 
     def scripted_action(self) -> NDArray[np.int64]:
-        """The action of the scenario's own script for the agent, int64 (3 + slots,); nothing changes.
+        """The action of the scenario's own script for the seat that is played, int64 (3 + slots,); nothing changes.
 
         Raises:
-            ValueError: the agent follows no frame.
+            ValueError: who sits there follows no frame.
         """
-        scripted: NDArray[np.int64] = self._table.scripted_actions()[0]
+        scripted: NDArray[np.int64] = self._table.scripts_of(self._player)[0]
         return scripted
 
     @property

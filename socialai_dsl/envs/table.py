@@ -430,20 +430,25 @@ class Table(Copied):
 
     def scripts_of_all(self) -> NDArray[np.int64]:
         """The actions of the scripts on all seats, int64 (E S, 3 + slots); nothing changes in the rooms."""
-        for program in self.programs:
-            framed = set(program.table(Header.FRAME_AT)[:, FrameColumn.ENTITY].tolist())
-            lacking = [str(seat) for seat in program.seats[1:] if program.entities.index(seat) not in framed]
-            if lacking:
-                raise ValueError(f"{lacking[0]} of {program.name} follows no frame, so it has no script")
-        found = np.zeros((self.rows, self.seats, self.batch.ports.actions.shape[1]), np.int64)
-        found[:, 0] = self.scripted_actions()
+        found = [self.scripts_of(seat) for seat in range(self.seats)]
+        return np.stack(found, axis=1).reshape(self.players, -1)
+
+    def scripts_of(self, seat: int) -> NDArray[np.int64]:
+        """The actions of the script on one seat, int64 (E, 3 + slots); nothing changes in the rooms."""
+        if seat == 0:
+            return self.scripted_actions()
+        found = np.zeros((self.rows, self.batch.ports.actions.shape[1]), np.int64)
         played = self.batch.program_numbers()
         for number, program in enumerate(self.programs):
+            framed = set(program.table(Header.FRAME_AT)[:, FrameColumn.ENTITY].tolist())
+            if program.entities.index(program.seats[seat]) not in framed:
+                raise ValueError(
+                    f"{program.seats[seat]} of {program.name} follows no frame, so it has no script"
+                )
             rows = np.flatnonzero(played == number)
-            for seat, row in enumerate(program.seat_table.tolist(), 1):
-                wishes = self.state.registers[rows, row[SeatColumn.FIRST] + SeatRegister.WISH :][:, :2]
-                found[rows, seat] = self._encoded(number, wishes)
-        return found.reshape(self.players, -1)
+            wish = program.seat_table[seat - 1, SeatColumn.FIRST] + SeatRegister.WISH
+            found[rows] = self._encoded(number, self.state.registers[rows, wish : wish + 2])
+        return found
 
     def _encoded(self, number: int, wishes: NDArray[np.int32]) -> NDArray[np.int64]:
         """Bodies and 1 + lines of a program, (N, 2), as actions; what cannot be done or said is left out."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, play
+from socialai_dsl.episodes.play import Observer, OneEpisode, Rooms, play
 from socialai_dsl.episodes.play import Step as RoomStep
 from socialai_dsl.episodes.policies import ReplayedPolicy
 from socialai_dsl.program_suite import outcome_name
@@ -101,7 +101,7 @@ def film(
     """
     filming = _Filming(title, endings or {})
     rooms = Rooms(env, [filming])
-    play(rooms, {AGENT: ReplayedPolicy(actions)}, OneEpisode(reset))
+    play(rooms, {rooms.own: ReplayedPolicy(actions)}, OneEpisode(reset))
     assert not rooms.running.any(), f"internal: played again, {title} goes on after {len(actions)} steps"
     return filming.episode
 
@@ -126,7 +126,7 @@ class _Filming(Observer):
         """See `Observer.stepped`."""
         episode, ended = self.episode, bool(step.ended[0])
         words = describe_step(
-            rooms.env.program, step.actions[AGENT][0], len(episode.frames), step.info["utterance"]
+            rooms.env.program, step.actions[rooms.own][0], len(episode.frames), step.info["utterance"]
         )
         episode.steps.append(words)
         episode.reward += float(step.reward[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Coroutine, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
 
@@ -30,13 +30,13 @@ class Step:
     Attributes:
         numbers: int64 (E,), the number of the episode in each room.
         running: bool (E,), the rooms in which an episode went on before this step; the others count for nothing.
-        actions: of each seat, int64 (E, heads).
-        reward: float64 (E,), of the first seat.
+        actions: of each seat that is played, int64 (E, heads).
+        reward: float64 (E,), of the rooms' own seat.
         ended: bool (E,), the rooms whose episode ended in this step, by an outcome or by the horizon.
-        success: bool (E,), of the first seat. outcome: int64 (E,), an index into the outcomes of what is played. Both
+        success: bool (E,), of the own seat. outcome: int64 (E,), an index into the outcomes of what is played. Both
             count where `ended`.
         info: what the environment returned.
-        others: of each other seat its reward, float64 (E,), and success, bool (E,).
+        others: of each other seat of the game its reward, float64 (E,), and success, bool (E,).
     """
 
     numbers: Int64
@@ -69,10 +69,14 @@ class Rooms:
     Args:
         env: what `make` or `make_vec` returns; a vector environment with `autoreset_mode="Disabled"`.
         observers: are told of all that happens.
+        own: the seat whose rewards and successes are those of a step; by default the first that is played.
+        scripts: the seats of a vector environment with all seats that nobody plays; they follow their frames.
 
     Attributes:
         env: the environment itself, without wrappers.
-        seats: the seats of a room: of a vector environment with all seats those, else the agent's.
+        names: the seats of the game as far as the caller can see them.
+        own: see above.
+        seats: those that are played: of a vector environment with all seats, else the one that the caller plays.
         count: E; 1 of a single environment.
         observations: of each seat, arrays of E.
         info: what the environment returned last.
@@ -80,19 +84,31 @@ class Rooms:
         running: bool (E,), where an episode goes on.
 
     Raises:
-        ValueError: the environment resets itself.
+        ValueError: the environment resets itself, or has no such seat.
     """
 
-    def __init__(self, env: Any, observers: Sequence[Observer] = ()) -> None:
+    def __init__(
+        self,
+        env: Any,
+        observers: Sequence[Observer] = (),
+        own: Seat | None = None,
+        scripts: Collection[Seat] = (),
+    ) -> None:
         self.env = env.unwrapped
         self._many = isinstance(self.env, gymnasium.vector.VectorEnv)
         if self._many:
             mode = self.env.metadata.get("autoreset_mode")
             if mode is not gymnasium.vector.AutoresetMode.DISABLED:
                 raise ValueError(f"envs: got the auto-reset mode {mode}, expected Disabled")
-        named = getattr(self.env, "seat_names", (AGENT,)) if self._many else (AGENT,)
-        self.seats: tuple[Seat, ...] = tuple(named) if len(named) > 1 else (AGENT,)
-        self.count = int(self.env.num_envs) // len(self.seats) if self._many else 1
+        self.names = tuple(self.env.seat_names)
+        self.seats: tuple[Seat, ...] = tuple(name for name in self.names if name not in scripts)
+        self.own = (self.seats or self.names)[0] if own is None else own
+        if strange := {self.own, *scripts} - set(self.names):
+            raise ValueError(f"seats: got {', '.join(sorted(strange))}, expected {', '.join(self.names)}")
+        if scripts:
+            played = [name in self.seats for name in self.names]
+            self.env.set_taken(np.tile(played, int(self.env.num_envs) // len(self.names)))
+        self.count = int(self.env.num_envs) // len(self.names) if self._many else 1
         self.observers = tuple(observers)
         self.observations: dict[Seat, Observation] = {}
         self.info: Mapping[str, Any] = {}
@@ -163,24 +179,28 @@ class Rooms:
         return found.astype(np.int64, copy=False)
 
     def _step_many(self, actions: Mapping[Seat, Int64]) -> Step:
-        count = len(self.seats)
-        together = np.stack([actions[seat] for seat in self.seats], axis=1).reshape(self.count * count, -1)
-        observation, reward, terminated, truncated, infos = self.env.step(together)
+        count = len(self.names)
+        nothing = np.zeros(
+            (self.count, len(self.action_sizes)), np.int64
+        )  # counts for no seat that nobody plays
+        together = np.stack([actions.get(name, nothing) for name in self.names], axis=1)
+        observation, reward, terminated, truncated, infos = self.env.step(
+            together.reshape(self.count * count, -1)
+        )
         self.info = infos
         self._see(observation)
         ended = self.running & (terminated | truncated)[::count]
         none = np.zeros(self.count * count, np.int64)
         success, outcome = infos.get("success", none.astype(np.bool_)), infos.get("outcome", none)[::count]
-        others = {
-            seat: (reward[number::count], success[number::count])
-            for number, seat in enumerate(self.seats)
-            if number
+        of_seats = {
+            name: (reward[number::count], success[number::count]) for number, name in enumerate(self.names)
         }
-        own = reward[::count], ended, success[::count], outcome
-        return Step(self.numbers, self.running, actions, *own, infos, others)
+        own_reward, own_success = of_seats.pop(self.own)
+        own = own_reward, ended, own_success, outcome
+        return Step(self.numbers, self.running, actions, *own, infos, of_seats)
 
     def _step_one(self, actions: Mapping[Seat, Int64]) -> Step:
-        observation, reward, terminated, truncated, info = self.env.step(actions[AGENT][0])
+        observation, reward, terminated, truncated, info = self.env.step(actions[self.own][0])
         self.info = info
         self._see(observation)
         ended = bool(terminated or truncated)
@@ -199,8 +219,9 @@ class Rooms:
     def _see(self, observation: Observation) -> None:
         whole = observation if self._many else {name: value[None] for name, value in observation.items()}
         self.observations = {
-            seat: {name: value[number :: len(self.seats)] for name, value in whole.items()}
-            for number, seat in enumerate(self.seats)
+            seat: {name: value[number :: len(self.names)] for name, value in whole.items()}
+            for number, seat in enumerate(self.names)
+            if seat in self.seats
         }
 
 

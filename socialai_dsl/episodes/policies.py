@@ -167,24 +167,6 @@ class ReplayedPolicy:
         return np.asarray(self._actions[self._next - 1], np.int64)[None]
 
 
-def replayed_seats(
-    names: Iterable[str], actions: Iterable[Int64]
-) -> tuple[dict[str, ReplayedPolicy] | None, list[Int64]]:
-    """Players of the other seats of a recorded episode, and the first seat's own actions, int64 (heads,) each.
-
-    Args:
-        names: of the seats, the first one first.
-        actions: int64 (heads,) each, then there are no other players (None); of several seats (S, heads).
-    """
-    kept = list(actions)
-    if not kept or kept[0].ndim == 1:
-        return None, kept
-    _, *others = names
-    return {name: ReplayedPolicy([a[seat] for a in kept]) for seat, name in enumerate(others, 1)}, [
-        a[0] for a in kept
-    ]
-
-
 class Streams:
     """One stream of random numbers for each of E environments.
 

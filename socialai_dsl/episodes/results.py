@@ -153,7 +153,8 @@ class Actions(Observer):
     """Keeps the actions, so that an episode can be played again to be filmed or traced.
 
     Attributes:
-        played: number of an episode -> its actions, int64 (heads,) each, of several seats (S, heads).
+        played: number of an episode -> its actions, int64 (heads,) each, of several seats (S, heads), where what stands
+            for a seat that nobody plays counts for nothing.
     """
 
     def __init__(self) -> None:
@@ -162,8 +163,9 @@ class Actions(Observer):
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
         numbers = step.numbers.tolist()
-        actions = np.stack([step.actions[seat] for seat in rooms.seats], axis=1)
-        if len(rooms.seats) == 1:
+        nothing = np.zeros((rooms.count, len(rooms.action_sizes)), np.int64)
+        actions = np.stack([step.actions.get(seat, nothing) for seat in rooms.names], axis=1)
+        if len(rooms.names) == 1:
             actions = actions[:, 0]
         for room in np.flatnonzero(step.running).tolist():
             self.played.setdefault(numbers[room], []).append(actions[room])

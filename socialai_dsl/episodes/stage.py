@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.episodes.play import AGENT, Bools, Int64, Observer, Rooms, Seat, Step
+from socialai_dsl.episodes.play import Bools, Int64, Observer, Rooms, Seat, Step
 from socialai_dsl.episodes.policies import Observation, Policy
 
 
@@ -118,7 +118,7 @@ class Stage(Rooms):
 
     def rehearse(self, actions: Mapping[Seat, Int64], look: Callable[[], Any]) -> None:
         """Play a step that nobody sees, `look` at what came of it, and take it back; it prepares the first one."""
-        self.env.step(actions[AGENT][0])
+        self.env.step(actions[self.own][0])
         look()
         self._restore()
 

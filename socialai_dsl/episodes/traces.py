@@ -16,7 +16,7 @@ from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.options import reset_arguments
-from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Step, play
+from socialai_dsl.episodes.play import Observer, OneEpisode, Rooms, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.results import Actions
@@ -57,15 +57,15 @@ class Tracing(Observer):
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
-        self._seen = _alone(rooms.observations[AGENT])
+        self._seen = _alone(rooms.observations[rooms.own])
         self.tracer.begin(self.title, self._seen, rooms.info)
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
         thought = self.thought if self._think is None else self._think(self._seen)
-        self._seen = _alone(rooms.observations[AGENT])
+        self._seen = _alone(rooms.observations[rooms.own])
         self.tracer.step(
-            step.actions[AGENT][0],
+            step.actions[rooms.own][0],
             self._seen,
             float(step.reward[0]),
             bool(step.ended[0]),
@@ -79,7 +79,7 @@ class Tracing(Observer):
     def back(self, rooms: Rooms) -> None:
         """See `Observer.back`."""
         self.tracer.back()
-        self._seen = _alone(rooms.observations[AGENT])
+        self._seen = _alone(rooms.observations[rooms.own])
 
 
 def thought_of(policy: Policy) -> Thought | None:
@@ -131,7 +131,7 @@ def trace_of(
     """
     tracing = Tracing(Tracer(env, scenario, agent, endings or {}, about), episode, think, replies)
     rooms = Rooms(env, [tracing])
-    play(rooms, {AGENT: ReplayedPolicy(actions)}, OneEpisode(reset))
+    play(rooms, {rooms.own: ReplayedPolicy(actions)}, OneEpisode(reset))
     if cut_short is not None and rooms.running.any():
         tracing.tracer.cut_short(next(tracing.replies), cut_short)
     return tracing.tracer.trace().portable()
@@ -233,7 +233,7 @@ class TracedEpisode:
         self._reset, self._actions = reset, Actions()
         rooms = Rooms(self._env, [self._actions, *observers])
         try:
-            play(rooms, {AGENT: self._policy}, OneEpisode(reset), stop)
+            play(rooms, {rooms.own: self._policy}, OneEpisode(reset), stop)
         except ValueError as error:
             raise UsageError(str(error)) from error
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
-from socialai_dsl.envs.factory import compiled, make_vec
-from socialai_dsl.envs.vector_env import ScenarioVectorEnv
-from socialai_dsl.episodes.play import AGENT, Rooms, TestEpisodes, play
-from socialai_dsl.episodes.players import Player, make_policy
-from socialai_dsl.episodes.policies import Policy
-from socialai_dsl.episodes.results import EvalResult, Results, wilson_interval
-from socialai_dsl.episodes.scripts import script_of
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.episodes.players import Player
+from socialai_dsl.episodes.results import EvalResult, wilson_interval
 from socialai_dsl.errors import UsageError
-from socialai_dsl.program_suite import Playable, seats_of
+from socialai_dsl.evaluation.test_set import play_test_set
+from socialai_dsl.program_suite import seats_of
 from socialai_dsl.traces.endings import short_name
 
 _TOGETHER: Final = 100
@@ -94,76 +91,18 @@ def cross_play(players: Sequence[Player], scenario: str, loaded: Loaded, episode
         raise UsageError(
             f"{scenario}: only the agent has a seat; `seat: open` gives one to another member of the cast"
         )
-    scripted: Playable | None = None
-    if any(player.is_script for player in players):
-        found = script_of(scenario, loaded)
-        if found is None:
-            raise UsageError(f"{scenario}: the agent has no frame, and there is no variant `oracle`")
-        scripted = compiled(found.loaded)
     results = {}
     for one, other in np.ndindex(len(players), len(players)):
-        with_agent = scripted if scripted is not None and players[one].is_script else program
-        results[one, other] = _played(players[one], players[other], with_agent, seats, episodes)
+        partners = dict.fromkeys(seats[1:], players[other])
+        results[one, other] = play_test_set(
+            players[one], scenario, loaded, program, episodes, partners=partners
+        ).result
     return CrossPlay(scenario, seats, tuple(_called(players)), results)
 
 
 def _called(players: Sequence[Player]) -> list[str]:
     """A short name for each player: the script is `script`."""
     return ["script" if player.is_script else short_name(player.agent) for player in players]
-
-
-def _played(one: Player, other: Player, program: Playable, seats: Sequence[str], episodes: int) -> EvalResult:
-    """The test episodes of one player as the agent with another one on all other seats."""
-    envs = make_vec(
-        program, num_envs=min(_TOGETHER, episodes), copy=False, autoreset_mode="Disabled", seats="all"
-    )
-    try:
-        if other.is_script:
-            envs.set_taken(envs.seat == 0)  # scripts play by themselves
-        policies = {seat: _policy(other, envs, number) for number, seat in enumerate(seats) if number}
-        policies[AGENT] = _AgentsScript(envs) if one.is_script else _policy(one, envs, 0)
-        results = Results(envs.program.outcomes, episodes)
-        play(Rooms(envs, [results]), policies, TestEpisodes(episodes))
-        return results.result()
-    except ValueError as error:
-        raise UsageError(str(error)) from error
-    finally:
-        envs.close()
-
-
-def _policy(player: Player, envs: ScenarioVectorEnv, seat: int) -> Policy:
-    """What plays a seat; what one draws must not tell another anything, so each seat has a seed of its own."""
-    if player.is_script:
-        return _Nobody(len(Rooms(envs).action_sizes))
-    return make_policy(replace(player, seed=player.seed + (seat << 40)), envs)[0]
-
-
-class _Nobody:
-    """Acts on a seat that is not taken, where no action counts."""
-
-    def __init__(self, heads: int) -> None:
-        self._heads = heads
-
-    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
-        """Nothing to forget."""
-
-    def act(self, observation: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-        """Whatever it is."""
-        return np.zeros((len(observation["tokens"]), self._heads), np.int64)
-
-
-class _AgentsScript:
-    """The script of the agent in games of which all seats are played."""
-
-    def __init__(self, envs: ScenarioVectorEnv) -> None:
-        self._envs = envs
-
-    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
-        """Nothing to forget; its state is the environments'."""
-
-    def act(self, observation: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-        """What its frame would do now."""
-        return self._envs.scripted_actions(AGENT)
 
 
 def matrix_lines(found: CrossPlay, seat: str) -> list[str]:

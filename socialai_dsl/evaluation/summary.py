@@ -35,6 +35,10 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
         for member, played in figures.get("members", {}).items()
         if played["share"] > 0
     ]
+    rows[1:1] = [
+        (f"  of {seat}", f"{found['success_rate']:.1%}, {_interval(found)}")
+        for seat, found in figures.get("seats", {}).items()
+    ]
     if "invalid_rate" in figures:
         rows += _model_rows(figures)
     if figures.get("unsolved"):

@@ -1,7 +1,7 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
-from socialai_dsl.envs.factory import compiled, make, make_vec
+from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, TestEpisodes, play
-from socialai_dsl.episodes.players import Player, make_policy, require_trainer
-from socialai_dsl.episodes.policies import Policy, replayed_seats
+from socialai_dsl.episodes.partners import Company, Partners, company, own_seat, replayed_seats
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, TestEpisodes, play
+from socialai_dsl.episodes.players import Player, make_policy
+from socialai_dsl.episodes.policies import Policy
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
-from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
@@ -40,6 +40,87 @@ if TYPE_CHECKING:  # it needs Textual
 _TOGETHER: Final = 125
 
 
+@dataclass(frozen=True)
+class _Played:
+    """Test episodes that were played, as far as playing them again needs it; see `Evaluation`."""
+
+    scenario: str
+    loaded: Loaded
+    program: Playable
+    player: Player
+    actions: Mapping[int, list[NDArray[np.int64]]]
+    trials: int
+    seat: Seat
+    partners: Partners
+
+    def replayed(self, number: int) -> tuple[dict[Seat, Any] | None, list[NDArray[np.int64]]]:
+        """Who fills the other seats when an episode is played again, and the own actions.
+
+        It is seen from the player's seat; where nobody sat there, but its script played by itself, from the agent's.
+        """
+        seats = seats_of(self.program)
+        scripts = [seat for seat in seats if seat != AGENT and self.partners.get(seat, self.player).is_script]
+        own = AGENT if self.seat in scripts else self.seat
+        return replayed_seats(seats, own, scripts, self.actions[number])
+
+    def traces(
+        self,
+        numbers: Sequence[int],
+        texts: Mapping[str, str],
+        replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = MappingProxyType({}),
+        cut_short: Mapping[int, str] = MappingProxyType({}),
+    ) -> list[Trace]:
+        """See `Evaluation.traces`.
+
+        Args:
+            numbers: of the episodes.
+            texts: ending -> what the scenario says of it.
+            replies: see `Evaluation`.
+            cut_short: the endings of the episodes that no step ended.
+        """
+        # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
+        thinks = self.player.is_trained and self.trials == 1
+        found = []
+        for number in numbers:
+            seats, own = self.replayed(number)
+            env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded), seats=seats)
+            try:
+                policy = make_policy(self.player, env)[0] if thinks else None
+                found.append(
+                    trace_of(
+                        env,
+                        own,
+                        {"options": {"test_episode": number}},
+                        scenario=self.scenario,
+                        agent=self.player.agent,
+                        episode=f"test episode {number}",
+                        endings=texts,
+                        about=about_of(self.loaded),
+                        think=None if policy is None else _thinking(policy, number),
+                        replies=replies.get(number, ()),
+                        cut_short=_outcome(cut_short.get(number), texts),
+                    )
+                )
+            finally:
+                env.close()
+        return found
+
+
+def _outcome(ending: str | None, texts: Mapping[str, str]) -> Outcome | None:
+    return None if ending is None else Outcome(name=ending, success=False, text=texts[ending])
+
+
+def _thinking(policy: Any, number: int) -> Think:
+    """Asks a trained agent what it makes of each observation of an episode."""
+    policy.reset(np.ones(1, np.bool_), np.array([number]))
+
+    def think(observation: Any) -> Thought | None:
+        policy.act({name: value[None] for name, value in observation.items()})
+        return thought_of(policy)
+
+    return think
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Test episodes as an agent played them.
@@ -56,6 +137,8 @@ class Evaluation:
         folder: where it is kept, if it is. kept: the name that the scenario has there.
         trials: how many episodes in a row the player remembered.
         briefing: what the player was told of the task.
+        seat: the one that the player had, whose success and reward the results are.
+        partners: who sat on other seats; the player itself on those that are left.
     """
 
     scenario: str
@@ -72,6 +155,8 @@ class Evaluation:
     kept: str | None = None
     trials: int = 1
     briefing: Briefing = NO_BRIEFING
+    seat: Seat = AGENT
+    partners: Partners = field(default_factory=dict)
 
     @property
     def granted(self) -> dict[str, Any]:
@@ -130,8 +215,8 @@ class Evaluation:
             number: of the test episode.
             label: how the recording calls the agent.
         """
-        partners, own = replayed_seats(seats_of(self.program), self.actions[number])
-        env = make(self.program, render_mode="rgb_array", seats=partners)
+        seats, own = self._episodes.replayed(number)
+        env = make(self.program, render_mode="rgb_array", seats=seats)
         title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
@@ -149,79 +234,24 @@ class Evaluation:
         chosen = list(numbers)
         cut_short = {n: self.result.names[self.result.outcome[n]] for n in chosen if self.is_cut_short(n)}
         texts = {one.name: one.text for one in self.endings}
-        played = _Played(
-            self.scenario, self.loaded, self.program, self.player, self.actions, texts, self.trials
+        return self._episodes.traces(chosen, texts, self.replies, cut_short)
+
+    @property
+    def _episodes(self) -> _Played:
+        own, partners = self.seat, self.partners
+        return _Played(
+            self.scenario, self.loaded, self.program, self.player, self.actions, self.trials, own, partners
         )
-        return played.traces(chosen, self.replies, cut_short)
-
-
-@dataclass(frozen=True)
-class _Played:
-    """Test episodes that were played, as far as their traces need it; see `Evaluation`.
-
-    Attributes:
-        texts: ending -> what the scenario says of it.
-    """
-
-    scenario: str
-    loaded: Loaded
-    program: Playable
-    player: Player
-    actions: Mapping[int, list[NDArray[np.int64]]]
-    texts: Mapping[str, str]
-    trials: int
-
-    def traces(
-        self,
-        numbers: Sequence[int],
-        replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = MappingProxyType({}),
-        cut_short: Mapping[int, str] = MappingProxyType({}),
-    ) -> list[Trace]:
-        """See `Evaluation.traces`; `cut_short` has the endings of the episodes that no step ended."""
-        # In later trials an agent remembers more than its episode, so what it makes of that one is not known.
-        thinks = self.player.is_trained and self.trials == 1
-        found = []
-        for number in numbers:
-            partners, own = replayed_seats(seats_of(self.program), self.actions[number])
-            env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded), seats=partners)
-            try:
-                policy = make_policy(self.player, env)[0] if thinks else None
-                found.append(
-                    trace_of(
-                        env,
-                        own,
-                        {"options": {"test_episode": number}},
-                        scenario=self.scenario,
-                        agent=self.player.agent,
-                        episode=f"test episode {number}",
-                        endings=self.texts,
-                        about=about_of(self.loaded),
-                        think=None if policy is None else _thinking(policy, number),
-                        replies=replies.get(number, ()),
-                        cut_short=self._outcome(cut_short.get(number)),
-                    )
-                )
-            finally:
-                env.close()
-        return found
-
-    def _outcome(self, ending: str | None) -> Outcome | None:
-        return None if ending is None else Outcome(name=ending, success=False, text=self.texts[ending])
-
-
-def _thinking(policy: Any, number: int) -> Think:
-    """Asks a trained agent what it makes of each observation of an episode."""
-    policy.reset(np.ones(1, np.bool_), np.array([number]))
-
-    def think(observation: Any) -> Thought | None:
-        policy.act({name: value[None] for name, value in observation.items()})
-        return thought_of(policy)
-
-    return think
 
 
 def play_test_set(
-    player: Player, scenario: str, loaded: Loaded, program: Playable, episodes: int, trials: int = 1
+    player: Player,
+    scenario: str,
+    loaded: Loaded,
+    program: Playable,
+    episodes: int,
+    trials: int = 1,
+    partners: Partners = MappingProxyType({}),
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
@@ -232,6 +262,8 @@ def play_test_set(
         program: the same, compiled.
         episodes: how many.
         trials: how many in a row the player remembers.
+        partners: who sits on other seats than the player. On those that are left it plays as well, a person or a
+            language model on the first of them alone.
 
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
@@ -256,13 +288,21 @@ def play_test_set(
         )
         return replace(_of_model(played, scenario, loaded, program, player, briefing), trials=trials)
     kept = Actions()
-    with _seated(player, scenario, loaded, program, episodes // trials) as (envs, policies, told):
-        result = evaluate_policy(policies, envs, episodes, [kept], trials)
-    return Evaluation(scenario, loaded, program, player, result, endings, kept.played, told, trials=trials)
+    with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
+        result = _result_of(playing, episodes, [kept], trials)
+    told, own = playing.told, playing.own
+    found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
+    return replace(found, trials=trials, seat=own, partners=partners)
 
 
 def trace_test_episodes(
-    player: Player, scenario: str, loaded: Loaded, program: Playable, numbers: Sequence[int], trials: int = 1
+    player: Player,
+    scenario: str,
+    loaded: Loaded,
+    program: Playable,
+    numbers: Sequence[int],
+    trials: int = 1,
+    partners: Partners = MappingProxyType({}),
 ) -> tuple[list[Trace], list[str]]:
     """Trace some test episodes as `play_test_set` plays them, without playing those before.
 
@@ -276,6 +316,7 @@ def trace_test_episodes(
         program: the same, compiled.
         numbers: of the episodes.
         trials: how many in a row the player remembers.
+        partners: see `play_test_set`.
 
     Returns:
         The traces, and what is to be known about the player.
@@ -285,48 +326,21 @@ def trace_test_episodes(
     """
     sessions = sorted({number - number % trials for number in numbers})
     kept = Actions()
-    with _seated(player, scenario, loaded, program, len(sessions)) as (envs, policies, told):
-        play(Rooms(envs, [kept]), policies, TestEpisodes(sessions[-1] + trials, trials, iter(sessions)))
+    with _playing(player, partners, scenario, loaded, program, len(sessions)) as playing:
+        rooms = Rooms(playing.envs, [kept], playing.own, playing.scripts)
+        play(rooms, playing.policies, TestEpisodes(sessions[-1] + trials, trials, iter(sessions)))
     texts = {one.name: one.text for one in endings_of(loaded, program)}
-    played = _Played(scenario, loaded, program, player, kept.played, texts, trials)
-    return played.traces(numbers), told
+    played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners)
+    return played.traces(numbers, texts), playing.told
 
 
-@contextmanager
-def _seated(
-    player: Player, scenario: str, loaded: Loaded, program: Playable, sessions: int
-) -> Iterator[tuple[Any, dict[str, Policy], list[str]]]:
-    """A vector environment for this number of sessions, at most `_TOGETHER` at once, a policy for each seat that is
-    played, and their warnings.
-
-    Raises:
-        UsageError: the player does not fit the scenario, now or in the block.
-    """
-    if player.is_trained:
-        require_trainer()
-    played = compiled(with_script(scenario, loaded).loaded) if player.is_script else program
-    seats = seats_of(played)
-    envs = make_vec(
-        played,
-        num_envs=min(_TOGETHER, sessions),
-        copy=False,
-        autoreset_mode="Disabled",
-        # A script plays by itself where nobody sits; whoever learns or draws plays all seats.
-        seats="all" if len(seats) > 1 and not player.is_script else AGENT,
-    )
-    try:
-        # What one draws must not tell another anything, so each seat has a seed of its own.
-        seeds = [player.seed + (seat << 40) for seat in range(len(envs.seat_names))]
-        made = [make_policy(replace(player, seed=seed), envs) for seed in seeds]
-        yield (
-            envs,
-            {seat: policy for seat, (policy, _) in zip(envs.seat_names, made, strict=True)},
-            made[0][1],
-        )
-    except ValueError as error:
-        raise UsageError(f"{scenario}: {error}") from error
-    finally:
-        envs.close()
+def _playing(
+    player: Player, partners: Partners, scenario: str, loaded: Loaded, program: Playable, sessions: int
+) -> AbstractContextManager[Company]:
+    """Rooms for this number of sessions, at most `_TOGETHER` at once, with a player and its partners."""
+    players = {seat: partners.get(seat, player) for seat in seats_of(program)}
+    own = own_seat(partners, program)
+    return company(players, own, scenario, loaded, program, min(_TOGETHER, sessions))
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
@@ -386,14 +400,23 @@ def evaluate_policy(
         ValueError: `episodes` is less than 1 or than the number of environments, or these reset themselves; or the
             policy's actions are not the scenario's.
     """
+    players = policy if isinstance(policy, Mapping) else {AGENT: policy}
+    return _result_of(Company(envs, players, envs.seat_names[0]), episodes, observers, trials)
+
+
+def _result_of(
+    playing: Company, episodes: int, observers: Sequence[Observer] = (), trials: int = 1
+) -> EvalResult:
+    """See `evaluate_policy`."""
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
     if not 1 <= trials <= episodes or episodes % trials:
         raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
+    envs = playing.envs
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]
-    players = policy if isinstance(policy, Mapping) else {AGENT: policy}
-    play(Rooms(envs, [results, *observers]), players, TestEpisodes(episodes, trials))
+    rooms = Rooms(envs, [results, *observers], playing.own, playing.scripts)
+    play(rooms, playing.policies, TestEpisodes(episodes, trials))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
 

@@ -15,7 +15,7 @@ from socialai_dsl.envs import ScenarioEnv, make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.factory import Scenario, load_playable
-from socialai_dsl.episodes.play import AGENT, Rooms, Step
+from socialai_dsl.episodes.play import Rooms, Step
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import LastStep, Style, TextView, over
@@ -193,7 +193,7 @@ class TextSeat(Copied):
     def saw(self, rooms: Rooms, decision: Decision, step: Step) -> Turn:
         """The result of a decision whose action was played in the room."""
         assert decision.action is not None, "internal: a step was played"
-        seen, encoded = _seen(rooms), step.actions[AGENT][0]
+        seen, encoded = _seen(rooms), step.actions[rooms.own][0]
         self.actions.append(encoded)
         done, reward = bool(step.ended[0]), float(step.reward[0])
         if self._asker is not None:
@@ -336,7 +336,7 @@ class Episode(TextSeat):
         if decision.turn is not None:
             return decision.turn
         assert decision.action is not None, "internal: what plays no step has a turn"
-        step = self._rooms.step({AGENT: self.env.encode_action(decision.action)[None]})
+        step = self._rooms.step({self._rooms.own: self.env.encode_action(decision.action)[None]})
         return self.saw(self._rooms, decision, step)
 
     def close(self) -> None:
@@ -346,7 +346,7 @@ class Episode(TextSeat):
 
 def _seen(rooms: Rooms) -> dict[str, NDArray[Any]]:
     """The present observation of the agent's seat in the one room."""
-    return {name: value[0] for name, value in rooms.observations[AGENT].items()}
+    return {name: value[0] for name, value in rooms.observations[rooms.own].items()}
 
 
 def scripted_reply(episode: Episode) -> str:

@@ -6,12 +6,14 @@ import contextlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 from socialai_dsl.atomic import read_json, write_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import refuse_unknown
+from socialai_dsl.episodes.partners import partners_of
 from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
     Agent,
@@ -67,6 +69,7 @@ def evaluate(
     out: str | Path | None = None,
     record: int = RECORDED,
     trials: int = 1,
+    seats: Mapping[str, str] = MappingProxyType({}),
     **options: Any,
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
@@ -82,6 +85,8 @@ def evaluate(
         record: up to how many successes, and how many failures, are filmed there.
         trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
             that they show what can be learnt within a session. A person remembers all of a session in any case.
+        seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, or a trained
+            agent. The agent that is tested plays on the seats that are left, and results are those of the first.
         options: of a trained agent `greedy`, `seed`, `device`, `net` and `algorithm`, of `random` the `seed`; of a
             language model those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`,
             see `Player`; of a person `view`, and `participant`, with which the name of the session's folder begins.
@@ -96,7 +101,8 @@ def evaluate(
     named = [] if scenario is None else [str(scenario)]
     player = made_player(agent, named, options, None if out is None else Path(out))
     place = None if out is None else Path(out)
-    with contextlib.closing(evaluate_each(player, named, episodes, record, place, trials)) as evaluations:
+    asked = episodes, record, place, trials, list(seats.items())
+    with contextlib.closing(evaluate_each(player, named, *asked)) as evaluations:
         return next(evaluations)
 
 
@@ -107,6 +113,7 @@ def evaluate_each(
     record: int = RECORDED,
     out: Path | None = None,
     trials: int = 1,
+    seats: Sequence[tuple[str, str]] = (),
 ) -> Generator[Evaluation, None, None]:
     """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
     if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
@@ -119,7 +126,7 @@ def evaluate_each(
     results = []
     with contextlib.nullcontext() if folder is None else _writing(folder):
         for scenario in scenarios or [own_scenario(str(player.run or player.agent))]:
-            evaluation = _evaluated(player, scenario, episodes, trials, record, folder)
+            evaluation = _evaluated(player, scenario, episodes, trials, record, folder, seats)
             results.append(result_of(evaluation))
             if folder is not None:
                 # After each scenario, so that nothing is lost should the agent not fit the next one.
@@ -136,12 +143,20 @@ def _writing(folder: Path) -> Iterator[None]:
 
 
 def _evaluated(
-    player: Player, scenario: str, episodes: int, trials: int, record: int, out: Path | None
+    player: Player,
+    scenario: str,
+    episodes: int,
+    trials: int,
+    record: int,
+    out: Path | None,
+    seats: Sequence[tuple[str, str]],
 ) -> Evaluation:
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
+    program = compiled(loaded)
+    asked = program, episodes, trials, partners_of(seats, scenario, program)
     if out is None:
-        return play_test_set(playing, scenario, loaded, compiled(loaded), episodes, trials)
+        return play_test_set(playing, scenario, loaded, *asked)
     place = out / scenario_folder_name(scenario)
     with new_folders(place) as made:
         kept = keep_scenario(place, scenario, loaded).scenario
@@ -149,7 +164,7 @@ def _evaluated(
         settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
         write_json(place / CONFIG, settings)
         made.update(place.iterdir())
-        played = play_test_set(playing, scenario, loaded, compiled(loaded), episodes, trials)
+        played = play_test_set(playing, scenario, loaded, *asked)
     evaluation = replace(played, folder=place, kept=kept)
     write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
     write_json(place / RESULT, result_of(evaluation))
@@ -230,6 +245,7 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "greedy": player.greedy,
         "seed": player.seed,
         "trials": evaluation.trials,
+        **_seats(evaluation),
         **evaluation.granted,
         **more,
         "warnings": list(evaluation.warnings),
@@ -237,6 +253,14 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "program_sha256": evaluation.program.sha256,
         "versions": versions(),
     }
+
+
+def _seats(evaluation: Evaluation) -> dict[str, Any]:
+    """On which seat the player sat, and with whom, if anybody was named."""
+    if not evaluation.partners:
+        return {}
+    partners = {seat: short_name(player.agent) for seat, player in evaluation.partners.items()}
+    return {"seat": evaluation.seat, "partners": partners}
 
 
 def own_scenario(agent: str) -> str:

@@ -183,7 +183,7 @@ def test_a_member_without_a_frame_has_no_script(tmp_path: Path) -> None:
     path = Folder(tmp_path).write("free", "cast: {bob: {at: [3, 3], seat: open}}")
     envs = sd.make_vec(str(path), 1, seats="all")
     envs.reset(seed=0)
-    with pytest.raises(ValueError, match="bob of free follows no frame"):
+    with pytest.raises(ValueError, match="of free follows no frame"):
         envs.scripted_actions()
 
 

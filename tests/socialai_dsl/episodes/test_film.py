@@ -34,7 +34,7 @@ PROGRAM = cast(Program, Words())
 class Stand:
     """An environment of three steps that says what it was told to."""
 
-    program, action_space = PROGRAM, MultiDiscrete([4, 2, 2, 2])
+    program, action_space, seat_names = PROGRAM, MultiDiscrete([4, 2, 2, 2]), ("agent",)
 
     def __init__(self, heard: list[str], **more: str) -> None:
         self._heard, self._more = heard, more

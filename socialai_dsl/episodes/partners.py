@@ -1,0 +1,210 @@
+"""Who sits on which seats of a scenario: players for the rooms of a test, and partners of the one who plays alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.diagnostics import suggested
+from socialai_dsl.envs.factory import compiled, make, make_vec
+from socialai_dsl.envs.seats import RANDOM, SCRIPT
+from socialai_dsl.episodes.play import AGENT, Seat
+from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
+from socialai_dsl.episodes.scripts import with_script
+from socialai_dsl.errors import OptionError, UsageError
+from socialai_dsl.program_suite import Playable, seats_of
+
+Partners = Mapping[Seat, Player]
+"""Who plays on seats that the one in question does not play."""
+
+_SEAT = "seat"
+
+
+def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, Player]:
+    """Who is meant by pairs of a seat and a player: `script`, `random`, the path of a trained agent or `shipped:NAME`.
+
+    Args:
+        named: the pairs.
+        scenario: as it was asked for.
+        program: the same, compiled.
+
+    Raises:
+        UsageError: a seat does not exist or has two players, a player is unknown, or no seat is left.
+    """
+    seats = seats_of(program)
+    found: dict[Seat, Player] = {}
+    for seat, name in named:
+        if seat not in seats:
+            near = suggested(seat, seats, quoted=repr)
+            raise OptionError(_SEAT, f"got {seat!r}, expected one of {', '.join(seats)}{near}")
+        if seat in found:
+            raise OptionError(_SEAT, f"got two players for {seat}, expected one")
+        found[seat] = Player("oracle" if name == SCRIPT else named_agent(name, scenario))
+    if len(found) == len(seats):
+        raise OptionError(_SEAT, f"got a player for {', '.join(seats)}, expected one seat left for who plays")
+    return found
+
+
+def own_seat(partners: Partners, program: Playable) -> Seat:
+    """The seat of the one who has these partners: the first that is left."""
+    return next(seat for seat in seats_of(program) if seat not in partners)
+
+
+def seating(
+    partners: Partners, scenario: str, loaded: Loaded
+) -> tuple[Loaded, dict[Seat, str | Policy] | None]:
+    """What is made for one who plays alone, and who fills the other seats there, as `make` takes it by `seats`.
+
+    Args:
+        partners: of other seats; the rest follow their scripts.
+        scenario: as it was asked for.
+        loaded: the same.
+
+    Returns:
+        The scenario, or its variant `oracle` where a script plays the agent; None where nobody was named.
+
+    Raises:
+        UsageError: a partner has no script, does not fit, or is none that can be asked here.
+    """
+    if not partners:
+        return loaded, None
+    if AGENT in partners and partners[AGENT].is_script:
+        loaded = with_script(scenario, loaded).loaded
+    program = compiled(loaded)
+    env = make(program)
+    try:
+        return loaded, {seat: _filling(player, seat, program, env) for seat, player in partners.items()}
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    finally:
+        env.close()
+
+
+def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | Policy:
+    if player.is_script:
+        return SCRIPT
+    if player.agent == RANDOM and player.policy is None:
+        return RANDOM
+    if player.is_model or player.is_person:
+        raise OptionError(
+            _SEAT, f"got {player.agent!r} for {seat}, expected script, random or a trained agent"
+        )
+    if player.is_trained:
+        require_trainer()
+    return _seated(player, seats_of(program).index(seat), env)[0]
+
+
+def _seated(player: Player, number: int, envs: Any) -> tuple[Policy, list[str]]:
+    """What plays a seat; what one draws must not tell another anything, so each seat has a seed of its own."""
+    return make_policy(replace(player, seed=player.seed + (number << 40)), envs)
+
+
+@dataclass(frozen=True, eq=False)
+class Company:
+    """Rooms of a scenario, who plays in them, and on which seats.
+
+    Attributes:
+        envs: a vector environment with all seats.
+        policies: of each seat that is played.
+        own: the seat of the one in question. scripts: the seats that nobody plays; they follow their scripts.
+        told: what is to be known about the players.
+    """
+
+    envs: Any
+    policies: Mapping[Seat, Policy]
+    own: Seat
+    scripts: tuple[Seat, ...] = ()
+    told: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def company(
+    players: Mapping[Seat, Player], own: Seat, scenario: str, loaded: Loaded, program: Playable, games: int
+) -> Iterator[Company]:
+    """Rooms in which these players sit on all seats.
+
+    Args:
+        players: of each seat.
+        own: the seat of the one in question.
+        scenario: as it was asked for.
+        loaded: the same.
+        program: the same, compiled.
+        games: how many rooms.
+
+    Raises:
+        UsageError: a player does not fit the scenario, now or in the block.
+    """
+    if any(player.is_trained for player in players.values()):
+        require_trainer()
+    played = compiled(with_script(scenario, loaded).loaded) if players[AGENT].is_script else program
+    seats = seats_of(program)
+    scripts = tuple(seat for seat in seats if seat != AGENT and players[seat].is_script)
+    envs = make_vec(
+        played,
+        num_envs=games,
+        copy=False,
+        autoreset_mode="Disabled",
+        seats="all" if len(seats) > 1 else AGENT,
+    )
+    plain = envs if played is program else make(program)  # which the players are made for
+    try:
+        policies: dict[Seat, Policy] = {}
+        told: list[str] = []
+        for number, seat in enumerate(seats):
+            if seat in scripts:
+                continue
+            if players[seat].is_script:
+                policies[seat] = AgentsScript(envs)
+                continue
+            policies[seat], warnings = _seated(players[seat], number, plain)
+            told += [warning for warning in warnings if warning not in told]
+        yield Company(envs, policies, own, scripts, told)
+    except ValueError as error:
+        raise UsageError(f"{scenario}: {error}") from error
+    finally:
+        envs.close()
+        plain.close()
+
+
+class AgentsScript:
+    """The script of the agent in rooms of which all seats are played."""
+
+    def __init__(self, envs: Any) -> None:
+        self._envs = envs
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Nothing to forget; its state is the environments'."""
+
+    def act(self, observation: Observation) -> Int64:
+        """What its frame would do now."""
+        found: Int64 = self._envs.scripted_actions(AGENT)
+        return found
+
+
+def replayed_seats(
+    seats: Sequence[Seat], own: Seat, scripts: Sequence[Seat], actions: Sequence[Int64]
+) -> tuple[dict[Seat, str | Policy] | None, list[Int64]]:
+    """Who fills the other seats of a recorded episode, as `make` takes it, and the own actions, int64 (heads,) each.
+
+    Args:
+        seats: of the game.
+        own: the one that is played again.
+        scripts: those that followed their scripts.
+        actions: int64 (heads,) each, then there are no other players (None); of several seats (S, heads).
+    """
+    kept = list(actions)
+    if not kept or kept[0].ndim == 1:
+        return None, kept
+    others: dict[Seat, str | Policy] = {
+        seat: SCRIPT if seat in scripts else ReplayedPolicy([step[number] for step in kept])
+        for number, seat in enumerate(seats)
+        if seat != own
+    }
+    return others, [step[seats.index(own)] for step in kept]
