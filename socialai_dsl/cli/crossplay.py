@@ -4,17 +4,15 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.arguments import episodes
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.terminal import json_text
-from socialai_dsl.episodes.players import require_trainer
-from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.crossplay import cross_play, matrix_lines
-from socialai_dsl.frontend import load
-from socialai_dsl.runs.evaluate import made_player
+from socialai_dsl.cli.terminal import columns, json_text
+from socialai_dsl.evaluation.crossplay import CrossPlay
+from socialai_dsl.runs.crossplay import crossplay
+from socialai_dsl.runs.folder import CROSSPLAY
 
 SUMMARY: Final = "let trained agents, scripts and chance play with each other, everybody with everybody"
+_WIDTH: Final = 100  # characters of a line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,27 +33,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of test episodes of each pair (default: 100)",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the figures there, as JSON")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help=f"write {CROSSPLAY} and a picture of the matrices there; `socialai report` takes this folder",
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play, and print a matrix for each seat."""
-    players = [made_player(name, [arguments.on], {}, None) for name in arguments.players]
-    if any(player.is_model or player.is_person for player in players):
-        raise UsageError(
-            "crossplay: got a language model or a person; expected random, oracle, a run or a checkpoint"
-        )
-    if any(player.is_trained for player in players):
-        require_trainer()
-    found = cross_play(players, arguments.on, load(arguments.on), arguments.episodes)
-    if arguments.out is not None:
-        write_json(arguments.out, found.figures())
+    found = crossplay(arguments.players, arguments.on, arguments.episodes, out=arguments.out)
     if arguments.json:
         print(json_text(found.figures()))
         return Exit.GOOD
     print(f"{arguments.on}, {arguments.episodes} test episodes of each pair")
     for seat in found.seats:
         print(f"\nsuccess of {seat}; rows: who plays {found.seats[0]}, columns: who plays the others")
-        print("\n".join(matrix_lines(found, seat)))
+        print("\n".join(_matrix(found, seat)))
+    if arguments.out is not None:
+        print(f"\nwritten to {arguments.out}")
     return Exit.GOOD
+
+
+def _matrix(found: CrossPlay, seat: str) -> list[str]:
+    """The success of a seat as lines; columns have numbers where names would take too much room."""
+    width = max(5, *map(len, found.names)) + 2
+    heads = list(found.names)
+    if width * (len(heads) + 1) > _WIDTH:
+        heads = [str(number) for number in range(1, len(heads) + 1)]
+    names = [
+        name if name == head else f"{head} {name}" for head, name in zip(heads, found.names, strict=True)
+    ]
+    cells = [
+        ["", *heads],
+        *(
+            [name, *(f"{found.rate((one, other), seat).success:.2f}" for other in range(len(names)))]
+            for one, name in enumerate(names)
+        ),
+    ]
+    lines = columns(cells)
+    others = found.with_others(seat)
+    told = f"with themselves {found.with_themselves(seat)}" + (
+        "" if others is None else f", with others {others}"
+    )
+    return [*lines, f"{told} (95% intervals over rooms)"]

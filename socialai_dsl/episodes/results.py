@@ -36,6 +36,36 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     return low, high
 
 
+def interval_over_rooms(won: NDArray[np.bool_]) -> tuple[float, float]:
+    """The 95 % confidence interval of the mean success of several players, or pairs of them, in the same rooms.
+
+    It puts the Wilson intervals of the players together by the correlations of their successes, since a hard room is
+    hard for all (Zou and Donner 2008; Zou, Huang and Zhang 2009). Of one player it is that player's interval. Where a
+    player has always or never succeeded, so that no correlation is known, it counts as 1, which makes the interval the
+    widest.
+
+    Args:
+        won: whether each player succeeded in each room, bool (players, rooms).
+
+    Raises:
+        ValueError: there is no room, or no player.
+    """
+    if won.size == 0:
+        raise ValueError(f"won: got the shape {won.shape}, expected at least one player and one room")
+    players, rooms = won.shape
+    rates = won.mean(axis=1)
+    deviations = won - rates[:, None]
+    spread = np.sqrt((deviations**2).sum(axis=1))
+    scale = np.outer(spread, spread)
+    together = np.divide(deviations @ deviations.T, scale, out=np.ones_like(scale), where=scale > 0)
+    np.fill_diagonal(together, 1.0)
+    ends = np.array([wilson_interval(int(successes), rooms) for successes in won.sum(axis=1)])
+    down, up = (np.abs(ends[:, side] - rates) / players for side in (0, 1))
+    mean = float(rates.mean())
+    low, high = (math.sqrt(max(0.0, float(gap @ together @ gap))) for gap in (down, up))
+    return max(0.0, mean - low), min(1.0, mean + high)
+
+
 @dataclass(frozen=True, eq=False)
 class EvalResult:
     """The result of a policy on test episodes 0 to N - 1.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +14,11 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.players import Player
-from socialai_dsl.episodes.results import EvalResult, wilson_interval
+from socialai_dsl.episodes.results import EvalResult, interval_over_rooms
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.program_suite import seats_of
-from socialai_dsl.traces.endings import short_name
-
-_TOGETHER: Final = 100
+from trainer.shipped import PREFIX
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,42 +35,66 @@ class CrossPlay:
     names: tuple[str, ...]
     results: Mapping[tuple[int, int], EvalResult]
 
-    def rates(self, seat: str) -> NDArray[np.float64]:
-        """The share of episodes that were a success of a seat, float64 (players, players), row: who plays the agent."""
-        count = len(self.names)
-        found = [self._won(pair, seat).mean() for pair in np.ndindex(count, count)]
-        return np.array(found).reshape(count, count)
+    def rate(self, pair: tuple[int, int], seat: str) -> Rate:
+        """The share of a pair's episodes that were a success of a seat."""
+        return _rate(self._won([pair], seat))
 
-    def _won(self, pair: tuple[int, ...], seat: str) -> NDArray[np.bool_]:
-        result = self.results[pair[0], pair[1]]
-        return result.success if seat == self.seats[0] else result.others[seat][0]
+    def with_themselves(self, seat: str) -> Rate:
+        """Mean success of the players with themselves."""
+        return _rate(self._won([pair for pair in self.results if pair[0] == pair[1]], seat))
 
-    def itself_and_others(self, seat: str) -> tuple[float, float | None]:
-        """Mean success of the players with themselves, and with each other; None where there is one player."""
-        rates = self.rates(seat)
-        own = np.eye(len(rates), dtype=bool)
-        return float(rates[own].mean()), float(rates[~own].mean()) if len(rates) > 1 else None
+    def with_others(self, seat: str) -> Rate | None:
+        """Mean success of the players with each other; None where there is one player."""
+        pairs = [pair for pair in self.results if pair[0] != pair[1]]
+        return _rate(self._won(pairs, seat)) if pairs else None
+
+    def _won(self, pairs: Sequence[tuple[int, int]], seat: str) -> NDArray[np.bool_]:
+        """Whether each episode of these pairs was a success of a seat, bool (pairs, episodes)."""
+        results = [self.results[pair] for pair in pairs]
+        return np.stack([one.success if seat == self.seats[0] else one.others[seat][0] for one in results])
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
-        found: dict[str, Any] = {"scenario": self.scenario, "players": list(self.names), "seats": {}}
+        found: dict[str, Any] = {
+            "scenario": self.scenario,
+            "episodes": self.results[0, 0].episodes,
+            "players": list(self.names),
+            "seats": {},
+        }
         for seat in self.seats:
-            alone, others = self.itself_and_others(seat)
-            cells = [
-                {
-                    "agent": self.names[one],
-                    "others": self.names[other],
-                    "success": float(self._won((one, other), seat).mean()),
-                    "interval": list(_interval(self._won((one, other), seat))),
-                }
-                for one, other in np.ndindex(len(self.names), len(self.names))
-            ]
-            found["seats"][seat] = {"with_themselves": alone, "with_others": others, "cells": cells}
+            others = self.with_others(seat)
+            found["seats"][seat] = {
+                "with_themselves": self.with_themselves(seat).figures(),
+                "with_others": None if others is None else others.figures(),
+                "cells": [
+                    {
+                        "agent": self.names[one],
+                        "others": self.names[other],
+                        **self.rate((one, other), seat).figures(),
+                    }
+                    for one, other in sorted(self.results)
+                ],
+            }
         return found
 
 
-def _interval(won: NDArray[np.bool_]) -> tuple[float, float]:
-    return wilson_interval(int(won.sum()), len(won))
+class Rate(NamedTuple):
+    """A success rate with its 95 % interval over rooms, see `interval_over_rooms`."""
+
+    success: float
+    low: float
+    high: float
+
+    def figures(self) -> dict[str, Any]:
+        """As a JSON-able object."""
+        return {"success": self.success, "interval": [self.low, self.high]}
+
+    def __str__(self) -> str:
+        return f"{self.success:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def _rate(won: NDArray[np.bool_]) -> Rate:
+    return Rate(float(won.mean()), *interval_over_rooms(won))
 
 
 def cross_play(players: Sequence[Player], scenario: str, loaded: Loaded, episodes: int = 100) -> CrossPlay:
@@ -97,22 +121,25 @@ def cross_play(players: Sequence[Player], scenario: str, loaded: Loaded, episode
         results[one, other] = play_test_set(
             players[one], scenario, loaded, program, episodes, partners=partners
         ).result
-    return CrossPlay(scenario, seats, tuple(_called(players)), results)
+    return CrossPlay(scenario, seats, tuple(names_of(players)), results)
 
 
-def _called(players: Sequence[Player]) -> list[str]:
-    """A short name for each player: the script is `script`."""
-    return ["script" if player.is_script else short_name(player.agent) for player in players]
+def names_of(players: Sequence[Player]) -> list[str]:
+    """A short name for each player: the script is `script`, a file or folder has its last part and as many of those
+    before it as tell it from others, and whoever plays twice has a number.
+    """
+    parts = [("script",) if one.is_script else _parts(one.agent) for one in players]
+    lengths = [1] * len(parts)
+    names = [part[-1] for part in parts]
+    for _ in range(max(map(len, parts))):
+        lengths = [n + (names.count(name) > 1) for n, name in zip(lengths, names, strict=True)]
+        names = ["/".join(part[-n:]) for part, n in zip(parts, lengths, strict=True)]
+    totals, seen = Counter(names), Counter[str]()
+    for place, name in enumerate(names):
+        seen[name] += 1
+        names[place] = f"{name} ({seen[name]})" if totals[name] > 1 else name
+    return names
 
 
-def matrix_lines(found: CrossPlay, seat: str) -> list[str]:
-    """The success of a seat as lines: rows are who plays the agent, columns who plays the others."""
-    rates, width = found.rates(seat), max(5, *map(len, found.names)) + 2
-    head = " " * width + "".join(f"{name:>{width}}" for name in found.names)
-    rows = [
-        f"{name:<{width}}" + "".join(f"{rate:>{width}.2f}" for rate in row)
-        for name, row in zip(found.names, rates, strict=True)
-    ]
-    alone, others = found.itself_and_others(seat)
-    told = f"with themselves {alone:.2f}" + ("" if others is None else f", with others {others:.2f}")
-    return [head, *rows, told]
+def _parts(agent: str) -> tuple[str, ...]:
+    return (agent,) if agent.startswith(PREFIX) else Path(agent).parts or (agent,)

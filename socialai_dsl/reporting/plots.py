@@ -25,6 +25,7 @@ from socialai_dsl.reporting.style import (
     WIDTH,
     colour,
     frames,
+    lanes,
     marker,
     new_axes,
     rates,
@@ -82,21 +83,9 @@ def success_figure(section: Section, baselines: Mapping[str, Baselines]) -> Figu
         for name, level, style in _levels(members, baselines):
             axes.plot([level] * 2, [top - 0.45, place - 0.55], style, color=MUTED, linewidth=1.1, label=name)
         place += 0.9
-    _lanes(axes, ticks, list(rows), place - 1.1, "success on the test episodes")
+    lanes(axes, ticks, list(rows), place - 1.1, "success on the test episodes")
     _legend(figure, axes)
     return figure
-
-
-def _lanes(axes: Axes, places: Sequence[float], names: Sequence[str], bottom: float, label: str) -> None:
-    """Names at the left, rates along the bottom."""
-    axes.set_yticks(places, [shown(name, 24) for name in names])
-    axes.tick_params(axis="y", length=0, labelsize=8.5, labelcolor=INK)
-    axes.set_ylim(bottom, -0.8)
-    axes.grid(axis="y", visible=False)
-    axes.grid(axis="x", visible=True)
-    axes.spines["left"].set_visible(False)
-    rates(axes, "x")
-    axes.set_xlabel(label)
 
 
 def _dots(axes: Axes, summary: Summary, place: float, index: int) -> None:
@@ -268,6 +257,6 @@ def iqm_figure(section: Section) -> Figure:
                 [value], [place + 0.36], "o", color=MUTED, markersize=3, label="rows that all columns have"
             )
     names = [one["column"] for one in section.columns]
-    _lanes(axes, np.arange(len(names)).tolist(), names, len(names) - 0.4, "interquartile mean of success")
+    lanes(axes, np.arange(len(names)).tolist(), names, len(names) - 0.4, "interquartile mean of success")
     _legend(figure, axes)
     return figure

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Final
 
@@ -84,6 +85,18 @@ def rates(axes: Axes, along: str = "y") -> None:
     (axes.set_ylim if along == "y" else axes.set_xlim)(-0.02, 1.02)
     axis.set_major_formatter(PercentFormatter(1.0))
     axis.set_ticks([0, 0.25, 0.5, 0.75, 1])
+
+
+def lanes(axes: Axes, places: Sequence[float], names: Sequence[str], bottom: float, label: str) -> None:
+    """Names at the left, rates along the bottom."""
+    axes.set_yticks(places, [shown(name, 24) for name in names])
+    axes.tick_params(axis="y", length=0, labelsize=8.5, labelcolor=INK)
+    axes.set_ylim(bottom, -0.8)
+    axes.grid(axis="y", visible=False)
+    axes.grid(axis="x", visible=True)
+    axes.spines["left"].set_visible(False)
+    rates(axes, "x")
+    axes.set_xlabel(label)
 
 
 def frames(axes: Axes, end: float) -> None:

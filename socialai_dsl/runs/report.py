@@ -92,13 +92,16 @@ def curves(folders: Sequence[Path], out: Path) -> list[Summary]:
     return summaries
 
 
-def require_libraries() -> None:
-    """Say how to install what reports need, if it is missing.
+def require_libraries(*libraries: str) -> None:
+    """Say how to install what reports and pictures need, if it is missing.
+
+    Args:
+        libraries: by default all that a page needs.
 
     Raises:
         UsageError: a library is not installed.
     """
-    for library in ("jinja2", "matplotlib", "pandas", "scipy"):
+    for library in libraries or ("jinja2", "matplotlib", "pandas", "scipy"):
         if importlib.util.find_spec(library) is None:
             raise UsageError(f"reports need {library}: pip install 'socialai-dsl[report]'")
 

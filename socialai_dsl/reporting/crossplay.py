@@ -1,0 +1,227 @@
+"""Cross-play in reports: the figures that `socialai crossplay --out` leaves, and the picture of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.patches import Rectangle
+from pydantic import Field, ValidationError
+
+from socialai_dsl.errors import UnreadableError
+from socialai_dsl.experiments.record import Record
+from socialai_dsl.reporting.records import described
+from socialai_dsl.reporting.style import COLOURS, INK, MUTED, colour, lanes, shown, styled
+from socialai_dsl.runs.folder import CROSSPLAY
+
+Share = Annotated[float, Field(ge=0, le=1)]
+
+_RAMP: Final = LinearSegmentedColormap.from_list("success", ["#f4f7fa", "#a9cfe6", COLOURS[0], "#003a5c"])
+_DARK: Final = 0.55
+"""Text in a cell of a greater success is white."""
+
+_CELL: Final = (0.8, 0.46)
+"""Inches of a cell."""
+_SMALL_CELL: Final = (0.62, 0.38)
+_FEW: Final = 5
+"""So many players have large cells, and names over their columns."""
+_NAME: Final = 30  # characters
+_SHORT: Final = 8
+
+
+class Rate(Record):
+    """A success rate with its 95 % interval."""
+
+    success: Share
+    interval: tuple[Share, Share]
+
+
+class Cell(Rate):
+    """The success of a seat in the episodes of a pair: who played the agent, and who played the others."""
+
+    agent: str
+    others: str
+
+
+class SeatRecord(Record):
+    """The success of a seat: means over the players with themselves and with each other, and that of each pair."""
+
+    with_themselves: Rate
+    with_others: Rate | None
+    cells: list[Cell] = Field(min_length=1)
+
+
+class CrossPlayRecord(Record):
+    """`crossplay.json`.
+
+    Attributes:
+        scenario: what was played. episodes: of each pair.
+        players: their names, each once. seats: the agent's first.
+    """
+
+    scenario: str
+    episodes: int = Field(ge=1)
+    players: list[str] = Field(min_length=1)
+    seats: dict[str, SeatRecord] = Field(min_length=1)
+
+    @property
+    def alike(self) -> list[tuple[str, ...]]:
+        """The seats, those together that have the same figures, as players have who share their success."""
+        groups: list[list[str]] = []
+        for seat, found in self.seats.items():
+            same = [group for group in groups if self.seats[group[0]] == found]
+            if same:
+                same[0].append(seat)
+            else:
+                groups.append([seat])
+        return [tuple(group) for group in groups]
+
+
+def read_crossplay(path: Path) -> CrossPlayRecord | None:
+    """What a file, or the file of a folder, says about cross-play; None of a folder without one.
+
+    Raises:
+        OSError: it cannot be read.
+        UnreadableError: it is damaged, or something else.
+    """
+    file = path / CROSSPLAY if path.is_dir() else path
+    if path.is_dir() and not file.exists():
+        return None
+    try:
+        found = CrossPlayRecord.model_validate_json(file.read_bytes())
+    except ValidationError as error:
+        raise UnreadableError(
+            f"{file}: expected what `socialai crossplay --out` writes, {described(error)}"
+        ) from None
+    pairs = {(one, other) for one in found.players for other in found.players}
+    for seat, figures in found.seats.items():
+        cells = [(cell.agent, cell.others) for cell in figures.cells]
+        if len(cells) != len(pairs) or set(cells) != pairs:
+            raise UnreadableError(
+                f"{file}: expected a cell of {seat} for each pair of players, got {len(cells)} cells"
+            )
+    return found
+
+
+def matrices_figure(found: CrossPlayRecord) -> Figure:
+    """A matrix for each seat side by side, one for seats that are alike, in a figure of their own."""
+    groups = found.alike
+    width, height = _size(found)
+    with styled():
+        figure = Figure(figsize=(width * len(groups), height + 0.3), layout="constrained")
+        FigureCanvasAgg(figure)
+        title = shown(found.scenario, round(width * len(groups) * 11))
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11.0, fontweight="bold")
+        parts = figure.subfigures(1, len(groups), squeeze=False)[0]
+        for part, seats in zip(parts, groups, strict=True):
+            _draw(part, found, seats)
+    return figure
+
+
+def matrix_figure(found: CrossPlayRecord, seats: Sequence[str]) -> Figure:
+    """The matrix of seats that are alike."""
+    figure = Figure(figsize=_size(found), layout="constrained")
+    FigureCanvasAgg(figure)
+    _draw(figure, found, seats)
+    return figure
+
+
+def _size(found: CrossPlayRecord) -> tuple[float, float]:
+    """Inches of a matrix with its names and means."""
+    wide, high = _cell(found)
+    longest = max(len(_label(name)) for name in found.players)
+    above = 0.6 if _numbered(found) else 0.5 + (longest * 0.055 if longest > _SHORT else 0.0)
+    count = len(found.players)
+    return max(4.2, count * wide + 0.9 + longest * 0.075), count * high + above + 1.3
+
+
+def _cell(found: CrossPlayRecord) -> tuple[float, float]:
+    return _SMALL_CELL if _numbered(found) else _CELL
+
+
+def _numbered(found: CrossPlayRecord) -> bool:
+    """Whether columns have numbers for names."""
+    return len(found.players) > _FEW
+
+
+def _draw(figure: Figure | SubFigure, found: CrossPlayRecord, seats: Sequence[str]) -> None:
+    cells = len(found.players) * _cell(found)[1]
+    matrix, means = figure.subplots(2, 1, height_ratios=(cells, 0.55))
+    _matrix(matrix, found, seats)
+    _means(means, found.seats[seats[0]], found.episodes)
+
+
+def _matrix(axes: Axes, found: CrossPlayRecord, seats: Sequence[str]) -> None:
+    """Rows: who plays the agent. Columns: who plays the others. Outlined: a player with itself."""
+    players, first = found.players, next(iter(found.seats))
+    rates = {(cell.agent, cell.others): cell for cell in found.seats[seats[0]].cells}
+    success = np.array([[rates[one, other].success for other in players] for one in players])
+    axes.pcolormesh(success, cmap=_RAMP, vmin=0, vmax=1, edgecolor="white", linewidth=1.5)
+    large = 8.5 if _numbered(found) else 10.0
+    for (row, column), rate in np.ndenumerate(success):
+        low, high = rates[players[row], players[column]].interval
+        ink = "white" if rate > _DARK else INK
+        centre: dict[str, Any] = {"ha": "center", "color": ink}
+        axes.text(
+            column + 0.5, row + 0.46, f"{rate:.2f}", va="bottom", fontsize=large, fontweight="bold", **centre
+        )
+        axes.text(column + 0.5, row + 0.58, f"{low:.2f}–{high:.2f}", va="top", fontsize=large - 3.0, **centre)
+    for place in range(len(players)):
+        axes.add_patch(
+            Rectangle(
+                (place + 0.03, place + 0.04), 0.94, 0.92, fill=False, edgecolor=COLOURS[1], linewidth=1.8
+            )
+        )
+    axes.invert_yaxis()
+    axes.grid(visible=False)
+    axes.spines[:].set_visible(False)
+    axes.tick_params(length=0, labelcolor=INK, labelsize=8.5)
+    names = heads = [_label(name) for name in players]
+    if _numbered(found):
+        heads = [str(number) for number in range(1, len(players) + 1)]
+        names = [f"{name}  {number}" for number, name in zip(heads, names, strict=True)]
+    places = np.arange(len(players)) + 0.5
+    axes.set_yticks(places, names)
+    slanted = max(map(len, heads)) > _SHORT
+    axes.set_xticks(
+        places,
+        heads,
+        rotation=40 if slanted else 0,
+        ha="left" if slanted else "center",
+        rotation_mode="anchor",
+    )
+    axes.xaxis.tick_top()
+    axes.xaxis.set_label_position("top")
+    others = [seat for seat in found.seats if seat != first]
+    axes.set_xlabel("plays " + (others[0] if len(others) == 1 else "the others"), color=MUTED)
+    axes.set_ylabel(f"plays {first}", color=MUTED)
+    axes.set_title(shown(f"success of {' and '.join(seats)}", 60), pad=8, loc="left")
+
+
+def _means(axes: Axes, seat: SeatRecord, episodes: int) -> None:
+    """The mean with themselves beside that with others, with intervals."""
+    rates = [("with themselves", seat.with_themselves, 1), ("with others", seat.with_others, 0)]
+    drawn = [(name, rate, ink) for name, rate, ink in rates if rate is not None]
+    for place, (_, rate, ink) in enumerate(drawn):
+        low, high = rate.interval
+        axes.plot([low, high], [place] * 2, color=colour(ink), linewidth=3, alpha=0.5, solid_capstyle="butt")
+        axes.plot([rate.success], [place], "o", color=colour(ink), markersize=4.5, clip_on=False, zorder=3)
+        axes.text(
+            1.04, place, f"{rate.success:.2f}  [{low:.2f}, {high:.2f}]", va="center", fontsize=8.0,
+            transform=axes.get_yaxis_transform(), clip_on=False,
+        )  # fmt: skip
+    below = f"mean success; {episodes:,} test episodes of each pair, 95 % intervals"
+    lanes(axes, list(range(len(drawn))), [name for name, *_ in drawn], len(drawn) - 0.4, below)
+    axes.xaxis.label.set(fontsize=7.5, color=MUTED)
+
+
+def _label(name: str) -> str:
+    """A name, both ends of it where it is long, since either may tell it from others."""
+    line = shown(name, len(name) + 1)
+    return line if len(line) <= _NAME else f"{line[: _NAME // 3]}…{line[-2 * _NAME // 3 :]}"

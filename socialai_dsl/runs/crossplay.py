@@ -1,0 +1,62 @@
+"""Lets everybody play with everybody, and leaves a folder of figures and a picture if one is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from socialai_dsl.atomic import write_json
+from socialai_dsl.episodes.players import Agent, require_trainer
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.crossplay import CrossPlay, cross_play
+from socialai_dsl.frontend import load
+from socialai_dsl.runs.evaluate import made_player
+from socialai_dsl.runs.folder import CROSSPLAY, new_folders
+from socialai_dsl.runs.report import require_libraries
+
+PICTURE: Final = "crossplay"
+"""The name of the picture, without its endings."""
+
+
+def crossplay(
+    agents: Sequence[Agent], scenario: str, episodes: int = 100, *, out: str | Path | None = None
+) -> CrossPlay:
+    """Let everybody play with everybody, and with themselves, as `socialai crossplay` does.
+
+    Args:
+        agents: `random`, `oracle` (each seat's own script), runs and checkpoints; see `evaluate`.
+        scenario: a path or a name, with several seats.
+        episodes: of each pair.
+        out: a folder that gets the figures as `crossplay.json`, and a picture of them as PNG and SVG; reports take it.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: it has one seat, or an agent cannot play here, or a library is missing (a ValueError).
+        OSError: a file cannot be written.
+    """
+    players = [made_player(agent, [scenario], {}, None) for agent in agents]
+    if any(player.is_model or player.is_person for player in players):
+        raise UsageError(
+            "crossplay: got a language model or a person; expected random, oracle, a run or a checkpoint"
+        )
+    if any(player.is_trained for player in players):
+        require_trainer()
+    if out is None:
+        return cross_play(players, scenario, load(scenario), episodes)
+    require_libraries("matplotlib")
+    with new_folders(Path(out)):
+        found = cross_play(players, scenario, load(scenario), episodes)
+        write(found, Path(out))
+    return found
+
+
+def write(found: CrossPlay, out: Path) -> None:
+    """Write the figures and the picture of them into a folder that is there."""
+    from socialai_dsl.reporting.crossplay import CrossPlayRecord, matrices_figure
+    from socialai_dsl.reporting.style import saved  # they load Matplotlib
+
+    write_json(out / CROSSPLAY, found.figures())
+    figure = matrices_figure(CrossPlayRecord.model_validate(found.figures()))
+    for form in ("png", "svg"):
+        (out / f"{PICTURE}.{form}").write_bytes(saved(figure, form))
