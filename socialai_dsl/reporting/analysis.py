@@ -13,7 +13,7 @@ import pandas as pd
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, RunRecord
 from socialai_dsl.reporting.published import Figure, against_published
-from socialai_dsl.reporting.records import EndingRecord
+from socialai_dsl.reporting.records import CrossPlayRecord, EndingRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
     Estimate,
@@ -46,7 +46,7 @@ class Summary:
     Attributes:
         condition: its entry and runs. name, row, column: where it stands.
         success: on the test episodes, a value for each seed that is done.
-        tests: the same of its further tests, by scenario.
+        tests: the same of its further tests, by scenario. seats: the same of each seat, if there are several.
         seeds: learning curves; None if no run has one.
         short: why it is too early to judge it, in phrases; nothing if it is not.
     """
@@ -62,6 +62,11 @@ class Summary:
                 [run.tests[test].success_rate for run in condition.runs if test in run.tests], dtype=float
             )
             for test in entry.tests
+        }
+        played = [figures.by_seat for figures in done]
+        self.seats = {
+            seat: pd.Series([seats[seat].success_rate for seats in played if seat in seats], dtype=float)
+            for seat in dict.fromkeys(seat for seats in played for seat in seats)
         }
         self.seeds = align(curves) if curves else None
         self.short = _too_short(condition, self.success, self.seeds)
@@ -307,7 +312,9 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
 
 
 def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
-    """Name of a table -> the table: runs, conditions, published, comparisons, rooms, outcomes and results by draws."""
+    """Name of a table -> the table: runs, conditions, published, comparisons, rooms, outcomes, results by draws and by
+    seats, cross-play.
+    """
     conditions, sections = analysis.experiment.conditions, analysis.sections
     rows = {
         "runs": [_run(condition, run) for condition in conditions for run in condition.runs],
@@ -317,6 +324,8 @@ def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
         "rooms": [one for section in sections for one in section.rooms],
         "outcomes": [row for condition in conditions for row in _outcomes(condition)],
         "results_by": [row for condition in conditions for row in _results_by(condition)],
+        "seats": [row for condition in conditions for row in _seats(condition)],
+        "crossplay": [row for one in analysis.experiment.crossplays for row in _pairs(one)],
     }
     return {name: pd.DataFrame(some, dtype=object) for name, some in rows.items()}
 
@@ -394,6 +403,41 @@ def _results_by(condition: Condition) -> list[dict[str, Any]]:
         for run in condition.done
         for draw, values in (run.figures.results_by if run.figures is not None else {}).items()
         for value, part in values.items()
+    ]
+
+
+def _seats(condition: Condition) -> list[dict[str, Any]]:
+    """Success of each seat of a scenario with several, by run."""
+    return [
+        {
+            "condition": condition.entry.name,
+            "id": run.id,
+            "seed": run.seed,
+            "seat": seat,
+            "test_episodes": part.episodes,
+            "success_rate": part.success_rate,
+        }
+        for run in condition.done
+        if run.figures is not None
+        for seat, part in run.figures.by_seat.items()
+    ]
+
+
+def _pairs(crossplay: CrossPlayRecord) -> list[dict[str, Any]]:
+    """Success of each seat with each pair of players."""
+    return [
+        {
+            "scenario": crossplay.scenario,
+            "seat": seat,
+            "agent": cell.agent,
+            "others": cell.others,
+            "test_episodes": crossplay.episodes,
+            "success_rate": cell.success,
+            "success_low": cell.interval[0],
+            "success_high": cell.interval[1],
+        }
+        for seat, found in crossplay.seats.items()
+        for cell in found.cells
     ]
 
 

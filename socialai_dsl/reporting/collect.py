@@ -17,11 +17,13 @@ from typing import Any, Final, TypeVar
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
+from socialai_dsl.errors import UnreadableError
 from socialai_dsl.experiments.folder import RUNS
 from socialai_dsl.experiments.folder import read_experiment as read_document
 from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, RunEntry
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.records import (
+    CrossPlayRecord,
     Figures,
     ResultRecord,
     StartRecord,
@@ -30,7 +32,18 @@ from socialai_dsl.reporting.records import (
     described,
 )
 from socialai_dsl.reporting.seeds import read_updates
-from socialai_dsl.runs.folder import CONFIG, EPISODES, METRICS, RESULT, SCENARIO, STARTS, STATUS, TESTS, Run
+from socialai_dsl.runs.folder import (
+    CONFIG,
+    CROSSPLAY,
+    EPISODES,
+    METRICS,
+    RESULT,
+    SCENARIO,
+    STARTS,
+    STATUS,
+    TESTS,
+    Run,
+)
 from trainer.config import HYPER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
@@ -110,6 +123,7 @@ class Experiment:
         name, profile, about: as the experiment says; name and about of a list of runs say that it is one.
         source_sha256: digest of the experiment's file, empty if there is none.
         conditions: in the order of the file.
+        crossplays: of scenarios with several seats, who played how well with whom.
     """
 
     name: str
@@ -117,6 +131,7 @@ class Experiment:
     about: str
     source_sha256: str
     conditions: tuple[Condition, ...]
+    crossplays: tuple[CrossPlayRecord, ...] = ()
 
     @property
     def scenarios(self) -> list[str]:
@@ -160,7 +175,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     for folder in folders:
         settings = _settings(folder, [])
         if settings is None or not isinstance(settings.get("scenario"), str):
-            raise ValueError(f"{folder}: expected the folder of a run, with its {CONFIG}")
+            raise ValueError(f"{folder}: expected the folder of a run, with its {CONFIG}, or of cross-play")
         seed = settings.get("seed")
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
@@ -186,8 +201,27 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         conditions.append(
             Condition(entry, tuple(sorted((run for _, run in members), key=lambda r: (r.seed, r.id))))
         )
-    names = f"{len(folders)} runs" if len(folders) != 1 else "one run"
+    if not folders:
+        return Experiment("cross-play", "", "", "", ())
+    names = f"{len(folders)} runs" if len(folders) > 1 else "one run"
     return Experiment(names, "", "Runs that were given one by one.", "", tuple(conditions))
+
+
+def read_crossplay(path: Path) -> CrossPlayRecord | None:
+    """What `socialai crossplay --out` wrote into a folder or a file; None of a folder without it.
+
+    Raises:
+        OSError: it cannot be read.
+        UnreadableError: it is damaged, or something else.
+    """
+    file = path / CROSSPLAY if path.is_dir() else path
+    if path.is_dir() and not file.exists():
+        return None
+    try:
+        return CrossPlayRecord.model_validate_json(file.read_bytes())
+    except ValidationError as error:
+        said = f"expected what `socialai crossplay --out` writes; {described(error)}"
+        raise UnreadableError(f"{file}: {said}") from None
 
 
 def _scenario_digest(folder: Path) -> str:

@@ -1,10 +1,9 @@
-"""Cross-play in reports: the figures that `socialai crossplay --out` leaves, and the picture of them."""
+"""Pictures of cross-play: who plays how well with whom."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,15 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Rectangle
-from pydantic import Field, ValidationError
 
-from socialai_dsl.errors import UnreadableError
-from socialai_dsl.experiments.record import Record
-from socialai_dsl.reporting.records import described
+from socialai_dsl.reporting.records import CrossPlayRecord, SeatRecord
 from socialai_dsl.reporting.style import COLOURS, INK, MUTED, colour, lanes, shown, styled
-from socialai_dsl.runs.folder import CROSSPLAY
-
-Share = Annotated[float, Field(ge=0, le=1)]
 
 _RAMP: Final = LinearSegmentedColormap.from_list("success", ["#f4f7fa", "#a9cfe6", COLOURS[0], "#003a5c"])
 _DARK: Final = 0.55
@@ -35,84 +28,10 @@ _NAME: Final = 30  # characters
 _SHORT: Final = 8
 
 
-class Rate(Record):
-    """A success rate with its 95 % interval."""
-
-    success: Share
-    interval: tuple[Share, Share]
-
-
-class Cell(Rate):
-    """The success of a seat in the episodes of a pair: who played the agent, and who played the others."""
-
-    agent: str
-    others: str
-
-
-class SeatRecord(Record):
-    """The success of a seat: means over the players with themselves and with each other, and that of each pair."""
-
-    with_themselves: Rate
-    with_others: Rate | None
-    cells: list[Cell] = Field(min_length=1)
-
-
-class CrossPlayRecord(Record):
-    """`crossplay.json`.
-
-    Attributes:
-        scenario: what was played. episodes: of each pair.
-        players: their names, each once. seats: the agent's first.
-    """
-
-    scenario: str
-    episodes: int = Field(ge=1)
-    players: list[str] = Field(min_length=1)
-    seats: dict[str, SeatRecord] = Field(min_length=1)
-
-    @property
-    def alike(self) -> list[tuple[str, ...]]:
-        """The seats, those together that have the same figures, as players have who share their success."""
-        groups: list[list[str]] = []
-        for seat, found in self.seats.items():
-            same = [group for group in groups if self.seats[group[0]] == found]
-            if same:
-                same[0].append(seat)
-            else:
-                groups.append([seat])
-        return [tuple(group) for group in groups]
-
-
-def read_crossplay(path: Path) -> CrossPlayRecord | None:
-    """What a file, or the file of a folder, says about cross-play; None of a folder without one.
-
-    Raises:
-        OSError: it cannot be read.
-        UnreadableError: it is damaged, or something else.
-    """
-    file = path / CROSSPLAY if path.is_dir() else path
-    if path.is_dir() and not file.exists():
-        return None
-    try:
-        found = CrossPlayRecord.model_validate_json(file.read_bytes())
-    except ValidationError as error:
-        raise UnreadableError(
-            f"{file}: expected what `socialai crossplay --out` writes, {described(error)}"
-        ) from None
-    pairs = {(one, other) for one in found.players for other in found.players}
-    for seat, figures in found.seats.items():
-        cells = [(cell.agent, cell.others) for cell in figures.cells]
-        if len(cells) != len(pairs) or set(cells) != pairs:
-            raise UnreadableError(
-                f"{file}: expected a cell of {seat} for each pair of players, got {len(cells)} cells"
-            )
-    return found
-
-
 def matrices_figure(found: CrossPlayRecord) -> Figure:
     """A matrix for each seat side by side, one for seats that are alike, in a figure of their own."""
     groups = found.alike
-    width, height = _size(found)
+    width, height = matrix_size(found)
     with styled():
         figure = Figure(figsize=(width * len(groups), height + 0.3), layout="constrained")
         FigureCanvasAgg(figure)
@@ -126,13 +45,13 @@ def matrices_figure(found: CrossPlayRecord) -> Figure:
 
 def matrix_figure(found: CrossPlayRecord, seats: Sequence[str]) -> Figure:
     """The matrix of seats that are alike."""
-    figure = Figure(figsize=_size(found), layout="constrained")
+    figure = Figure(figsize=matrix_size(found), layout="constrained")
     FigureCanvasAgg(figure)
     _draw(figure, found, seats)
     return figure
 
 
-def _size(found: CrossPlayRecord) -> tuple[float, float]:
+def matrix_size(found: CrossPlayRecord) -> tuple[float, float]:
     """Inches of a matrix with its names and means."""
     wide, high = _cell(found)
     longest = max(len(_label(name)) for name in found.players)

@@ -30,8 +30,9 @@ from socialai_dsl.reporting.analysis import (
     Summary,
 )
 from socialai_dsl.reporting.collect import RunRecord
+from socialai_dsl.reporting.crossplay import matrix_size
 from socialai_dsl.reporting.published import MARGIN
-from socialai_dsl.reporting.records import Figures, PartFigures, ResultRecord
+from socialai_dsl.reporting.records import CrossPlayRecord, Figures, PartFigures, Rate, ResultRecord
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
@@ -40,6 +41,8 @@ _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"
 _NONE: Final = "–"
 _RULES_SHOWN: Final = 12
 _DIGEST: Final = 12
+_REM: Final = 6.3
+"""Widths of the page for an inch of a figure."""
 
 Rows = list[dict[str, Any]]
 """A table of the page: what stands under each heading, as text; lines after the first are smaller print."""
@@ -77,6 +80,10 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         lead=_lead(analysis),
         remarks=list(_remarks(analysis)),
         sections=sections,
+        crossplays=[
+            _crossplay(f"crossplay{number}", found)
+            for number, found in enumerate(analysis.experiment.crossplays, start=1)
+        ],
         endings=[one for section in sections for one in section["endings"]],
         baselines=_baselines(analysis.baselines),
         runs=_runs(analysis, place),
@@ -154,6 +161,10 @@ def _duration(seconds: float) -> str:
 def _lead(analysis: Analysis) -> str:
     """What there is and what it says, in a few sentences of figures."""
     runs, summaries = analysis.experiment.runs, analysis.summaries
+    played = analysis.experiment.crossplays
+    crossplay = "Cross-play of " + ", ".join(scenario_name(one.scenario) for one in played) + "."
+    if played and not runs:
+        return crossplay
     states = Counter(_state_of(run) for run in runs)
     finished = states.pop("done", 0)
     others = f" ({', '.join(f'{count} {state}' for state, count in states.items())})" if states else ""
@@ -179,6 +190,8 @@ def _lead(analysis: Analysis) -> str:
     short = sum(bool(s.short) for s in summaries)
     if short:
         parts.append(f"{count_of(short, 'condition')} {'is' if short == 1 else 'are'} too short to judge.")
+    if played:
+        parts.append(crossplay)
     return " ".join(parts)
 
 
@@ -446,6 +459,48 @@ def _ending(summary: Summary, name: str) -> str:
     return f"{ending.text}\n{ending.file}:{ending.line}" if ending.file is not None else ending.text
 
 
+# -- cross-play --------------------------------------------------------------------------------------------------------
+
+
+def _crossplay(anchor: str, found: CrossPlayRecord) -> dict[str, Any]:
+    """The matrices of a cross-play, the means in a table, and all pairs in another."""
+    groups = list(enumerate(found.alike, start=1))
+    return {
+        "anchor": anchor,
+        "title": f"Cross-play: {scenario_name(found.scenario)}",
+        "episodes": found.episodes,
+        "width": f"{matrix_size(found)[0] * _REM:.1f}rem",
+        "drawings": [(f"{anchor}-{place}", _seats_text(seats)) for place, seats in groups],
+        "means": [
+            {
+                "success of": _seats_text(seats),
+                "with themselves": _rate(found.seats[seats[0]].with_themselves),
+                "with others": _rate(found.seats[seats[0]].with_others),
+            }
+            for _, seats in groups
+        ],
+        "pairs": [
+            {
+                f"plays {next(iter(found.seats))}": cells[0].agent,
+                "plays the others": cells[0].others,
+                **{
+                    f"success of {_seats_text(seats)}": _rate(cell)
+                    for (_, seats), cell in zip(groups, cells, strict=True)
+                },
+            }
+            for cells in zip(*(found.seats[seats[0]].cells for _, seats in groups), strict=True)
+        ],
+    }
+
+
+def _seats_text(seats: Sequence[str]) -> str:
+    return " and ".join(seats)
+
+
+def _rate(rate: Rate | None) -> str:
+    return _NONE if rate is None else _interval(Estimate(rate.success, *rate.interval))
+
+
 # -- where figures come from -------------------------------------------------------------------------------------------
 
 
@@ -473,7 +528,7 @@ def _runs(analysis: Analysis, place: Path) -> Rows:
             "seed": str(run.seed),
             "state": _state_of(run),
             "frames": f"{run.frames:,}",
-            "success": signed(getattr(run.figures, "success_rate", None), ".3f"),
+            "success": "\n".join(_successes(run)),
             "return": signed(getattr(run.figures, "mean_return", None), ".3f"),
             "length": signed(getattr(run.figures, "mean_length", None), ".1f"),
             "time": _NONE if run.result is None else _duration(run.result.train_seconds),
@@ -484,6 +539,13 @@ def _runs(analysis: Analysis, place: Path) -> Rows:
         for condition in analysis.experiment.conditions
         for run in condition.runs
     ]
+
+
+def _successes(run: RunRecord) -> Iterator[str]:
+    """The success of the agent, then that of each other seat."""
+    yield signed(getattr(run.figures, "success_rate", None), ".3f")
+    if run.figures is not None:
+        yield from (f"{seat} {part.success_rate:.3f}" for seat, part in run.figures.seats.items())
 
 
 def _replay(run: RunRecord, place: Path) -> str:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from socialai_dsl.baselines import Baselines
 from socialai_dsl.reporting.analysis import Analysis, Section, Summary
+from socialai_dsl.reporting.crossplay import matrix_figure
 from socialai_dsl.reporting.curve import draw_outcomes
 from socialai_dsl.reporting.seeds import Seeds
 from socialai_dsl.reporting.style import (
@@ -46,13 +47,19 @@ _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 
 
 def figures(analysis: Analysis) -> dict[str, Figure]:
-    """Name -> figure: for each part of the report its success, curves, endings and interquartile means."""
+    """Name -> figure: for each part of the report its success, curves, endings and interquartile means; for each
+    cross-play its matrices.
+    """
     with styled():
-        return {
+        found = {
             f"part{number}-{name}": figure
             for number, section in enumerate(analysis.sections, start=1)
             for name, figure in _figures(section, analysis.baselines)
         }
+        for number, crossplay in enumerate(analysis.experiment.crossplays, start=1):
+            for place, seats in enumerate(crossplay.alike, start=1):
+                found[f"crossplay{number}-{place}"] = matrix_figure(crossplay, seats)
+    return found
 
 
 def _figures(section: Section, baselines: Mapping[str, Baselines]) -> Iterator[tuple[str, Figure]]:

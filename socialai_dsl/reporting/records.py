@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from socialai_dsl.errors import first_mistake
 from socialai_dsl.experiments.record import Record
+
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class EndingRecord(Record):
@@ -43,6 +45,7 @@ class Figures(Record):
         actions: how they came about, in a phrase.
         trials: in order, where players remembered several episodes in a row.
         results_by: draw -> value -> what came of the episodes with it.
+        seats: of several seats, each but the agent's -> what came of the episodes for it.
         replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
             `cost` in US dollars, None where prices are not known.
     """
@@ -64,6 +67,13 @@ class Figures(Record):
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
     trials: list[PartFigures] = Field(default_factory=list)
     results_by: dict[str, dict[str, PartFigures]] = Field(default_factory=dict)
+    seats: dict[str, PartFigures] = Field(default_factory=dict)
+
+    @property
+    def by_seat(self) -> dict[str, PartFigures]:
+        """What came of the episodes for each seat, the agent first; nothing where it alone has one."""
+        own = PartFigures(episodes=self.episodes, success_rate=self.success_rate)
+        return {"agent": own, **self.seats} if self.seats else {}
 
 
 class ResultRecord(Record):
@@ -121,6 +131,62 @@ class UpdateRecord(Record):
     success: float | None
     outcomes: dict[str, float | None]
     rules: dict[str, float | None]
+
+
+class Rate(Record):
+    """A success rate with its 95 % interval."""
+
+    success: Share
+    interval: tuple[Share, Share]
+
+
+class Cell(Rate):
+    """The success of a seat in the episodes of a pair: who played the agent, and who played the others."""
+
+    agent: str
+    others: str
+
+
+class SeatRecord(Record):
+    """The success of a seat: means over the players with themselves and with each other, and that of each pair."""
+
+    with_themselves: Rate
+    with_others: Rate | None
+    cells: list[Cell] = Field(min_length=1)
+
+
+class CrossPlayRecord(Record):
+    """`crossplay.json`.
+
+    Attributes:
+        scenario: what was played. episodes: of each pair.
+        players: their names, each once. seats: the agent's first.
+    """
+
+    scenario: str
+    episodes: int = Field(ge=1)
+    players: list[str] = Field(min_length=1)
+    seats: dict[str, SeatRecord] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _every_pair_is_there(self) -> Self:
+        pairs = sorted((one, other) for one in self.players for other in self.players)
+        for seat, found in self.seats.items():
+            if sorted((cell.agent, cell.others) for cell in found.cells) != pairs:
+                raise ValueError(f"expected a cell of {seat} for each pair of players")
+        return self
+
+    @property
+    def alike(self) -> list[tuple[str, ...]]:
+        """The seats, those together that have the same figures, as players have who share their success."""
+        groups: list[list[str]] = []
+        for seat, found in self.seats.items():
+            same = [group for group in groups if self.seats[group[0]] == found]
+            if same:
+                same[0].append(seat)
+            else:
+                groups.append([seat])
+        return [tuple(group) for group in groups]
 
 
 def described(error: ValidationError) -> str:

@@ -53,8 +53,9 @@ def crossplay(
 
 def write(found: CrossPlay, out: Path) -> None:
     """Write the figures and the picture of them into a folder that is there."""
-    from socialai_dsl.reporting.crossplay import CrossPlayRecord, matrices_figure
-    from socialai_dsl.reporting.style import saved  # they load Matplotlib
+    from socialai_dsl.reporting.crossplay import matrices_figure  # it loads Matplotlib
+    from socialai_dsl.reporting.records import CrossPlayRecord
+    from socialai_dsl.reporting.style import saved
 
     write_json(out / CROSSPLAY, found.figures())
     figure = matrices_figure(CrossPlayRecord.model_validate(found.figures()))

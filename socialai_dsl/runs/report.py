@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -36,7 +37,8 @@ def report(
     """Write a page about runs and evaluations of every kind of player, as `socialai report` does.
 
     Args:
-        folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`.
+        folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`;
+            besides, what `socialai crossplay --out` wrote.
         out: folder to write (default: `report` in the experiment's folder, or here for runs).
         baselines: whether script, chance and success without NPCs are measured; otherwise only what is known is shown.
         tell: takes a line before each scenario that is measured.
@@ -108,12 +110,15 @@ def require_libraries(*libraries: str) -> None:
 
 def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
     """What the folders hold, and where its report belongs."""
-    from socialai_dsl.reporting.collect import read_experiment, read_runs
+    from socialai_dsl.reporting.collect import read_crossplay, read_experiment, read_runs
 
     try:
-        if len(folders) == 1 and (folders[0] / EXPERIMENT).exists():
-            return read_experiment(folders[0]), folders[0]
-        return read_runs(folders), Path()
+        found = {folder: read_crossplay(folder) for folder in folders if folder.exists()}
+        crossplays = tuple(one for one in found.values() if one is not None)
+        runs = [folder for folder in folders if found.get(folder) is None]
+        if len(runs) == 1 and (runs[0] / EXPERIMENT).exists():
+            return replace(read_experiment(runs[0]), crossplays=crossplays), runs[0]
+        return replace(read_runs(runs), crossplays=crossplays), Path()
     except ValueError as error:
         raise UsageError(str(error)) from error
 
