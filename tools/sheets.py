@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "write the data sheets of the shipped scenarios, or check that they are up to date"
 
-_IN_FOLDERS: Final = "classics/"
+_IN_FOLDERS: Final = ("classics/", "together/")
 MEASURED: Final = "measured.json"
 INDEX: Final = "README.md"
 _FOLDER: Final = Path("docs/scenarios")
@@ -81,17 +81,12 @@ def sheeted() -> list[str]:
 
 def stale_files(names: list[str], folder: Path) -> list[Path]:
     """The sheets, pictures and the list in a folder that are missing or would be written otherwise now."""
-    from tools.sheets_picture import picture
-
     stale = [
         folder / file
         for file, text in _pages(names, folder).items()
         if not (folder / file).is_file() or (folder / file).read_text(encoding="utf-8") != text
     ]
-    stale += [
-        folder / f"{name}.png" for name in names if not _alike(folder / f"{name}.png", picture(_load(name)))
-    ]
-    return stale
+    return stale + [file for file, drawn in _pictures(names, folder).items() if not _alike(file, drawn)]
 
 
 def _pages(names: list[str], folder: Path) -> dict[str, str]:
@@ -108,15 +103,26 @@ def _pages(names: list[str], folder: Path) -> dict[str, str]:
 def _write(names: list[str], folder: Path) -> None:
     from PIL import Image
 
-    from tools.sheets_picture import picture
-
     for file, text in _pages(names, folder).items():
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / file, text)
+    for place, drawn in _pictures(names, folder).items():
+        if not _alike(place, drawn):
+            Image.fromarray(drawn).save(place, optimize=True)
+
+
+def _pictures(names: list[str], folder: Path) -> "dict[Path, NDArray[np.uint8]]":
+    """The pictures of the sheets: a room of each scenario, and the diagrams of its dilemmas."""
+    from socialai_dsl.analysis.data_sheet import dilemma_pictures
+    from tools.sheets_picture import diagram, picture
+
+    measured, drawn = _measurements(folder), {}
     for name in names:
-        drawn = picture(_load(name))
-        if not _alike(folder / f"{name}.png", drawn):
-            Image.fromarray(drawn).save(folder / f"{name}.png", optimize=True)
+        drawn[folder / f"{name}.png"] = picture(_load(name))
+        dilemmas = (measured.get(name) or {}).get("dilemmas", ())
+        for file, figures in zip(dilemma_pictures(name, measured.get(name)), dilemmas, strict=True):
+            drawn[(folder / name).parent / file] = diagram(name, figures)
+    return drawn
 
 
 def _measure(names: list[str], folder: Path) -> None:
@@ -159,7 +165,21 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
         }
     if shares := rival_shares(name, rooms, seed):
         figures["rivals"] = shares
+    if diagrams := _dilemmas(name, rooms, seed):
+        figures["dilemmas"] = diagrams
     return figures
+
+
+def _dilemmas(name: str, rooms: int, seed: int) -> list[dict[str, Any]]:
+    """What is paid by the number of cooperators, for each claim `dilemma`."""
+    from socialai_dsl.analysis.dilemma import schelling
+    from socialai_dsl.checking.loaded import LoadedScenario
+
+    loaded = _load(name)
+    if not isinstance(loaded, LoadedScenario):
+        return []
+    claims = [plan for plan in loaded.checked.properties if plan.kind == "dilemma"]
+    return [schelling(loaded, plan.frames, rooms, seed).figures() for plan in claims]
 
 
 def rival_shares(name: str, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any]:

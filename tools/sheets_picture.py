@@ -1,6 +1,7 @@
-"""The pictures of a data sheet: rooms of a scenario at the start of an episode."""
+"""The pictures of a data sheet: rooms of a scenario at the start of an episode, and what a dilemma pays."""
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,3 +56,18 @@ def _padded(room: "NDArray[np.uint8]", side: int) -> "NDArray[np.uint8]":
     y, x = ((side + _GAP - length) // 2 for length in room.shape[:2])
     whole[y : y + room.shape[0], x : x + room.shape[1]] = room
     return whole
+
+
+def diagram(name: str, figures: Mapping[str, Any]) -> "NDArray[np.uint8]":
+    """The Schelling diagram of measured figures, uint8 (H, W, 3)."""
+    import io
+
+    import numpy as np
+    from PIL import Image
+
+    from socialai_dsl.reporting.dilemma import SchellingRecord, dilemma_figure
+    from socialai_dsl.reporting.style import saved
+
+    drawn = saved(dilemma_figure(name, SchellingRecord.model_validate(figures)), "png")
+    with Image.open(io.BytesIO(drawn)) as image:
+        return np.asarray(image.convert("RGB"))

@@ -57,7 +57,11 @@ def _sheet(
     data = _data(loaded)
     lines += [*_facts(name, loaded, data, link), ""]
     body = _suite(loaded, bool(link)) if isinstance(loaded, LoadedSuite) else _scenario(loaded, data)
-    ships = (_variants(name), _measured(measured), _as_coded(name)) if is_shipped(name) else ()
+    ships = (
+        (_variants(name), _measured(measured), _dilemmas(name, measured), _as_coded(name))
+        if is_shipped(name)
+        else ()
+    )
     for section in (*body, *ships):
         if section:
             lines += [*section, ""]
@@ -188,6 +192,32 @@ def _measured(measured: Mapping[str, Any] | None) -> list[str]:
         lines += ["", f"Rooms that the script does not solve were searched: {found}. No policy succeeds in more than "
                   f"{script['ceiling']:.2%} of these rooms."]  # fmt: skip
     return lines
+
+
+def _dilemmas(name: str, measured: Mapping[str, Any] | None) -> list[str]:
+    """What is paid to those who cooperate and to those who defect, as a picture and in a table."""
+    lines: list[str] = []
+    for picture, found in zip(
+        dilemma_pictures(name, measured), (measured or {}).get("dilemmas", ()), strict=True
+    ):
+        cooperate, defect = found["frames"]
+        columns = ("others who cooperate", f"to cooperate, {code(cooperate)}", f"to defect, {code(defect)}")
+        paid = zip(found["cooperators"], found["defectors"], strict=True)
+        rows = [(str(others), f"{one:.3f}", f"{other:.3f}") for others, (one, other) in enumerate(paid)]
+        lines += [
+            "",
+            f"It is {found['verdict']}.",
+            "",
+            f"![what each is paid, by how many others cooperate]({picture})",
+        ]
+        lines += ["", *table(columns, rows)]
+    return ["## Dilemma", *lines] if lines else []
+
+
+def dilemma_pictures(name: str, measured: Mapping[str, Any] | None) -> list[str]:
+    """The names of the pictures of a scenario's dilemmas, beside its sheet."""
+    count, own = len((measured or {}).get("dilemmas", ())), name.rpartition("/")[2]
+    return [f"{own}_dilemma{number if count > 1 else ''}.png" for number in range(1, count + 1)]
 
 
 def _rows_apart(figures: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:

@@ -8,8 +8,8 @@ all cooperate than when nobody does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import asdict, dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,16 @@ class Schelling:
     """What players are paid on average, by how many of the others cooperate.
 
     Attributes:
-        cooperators, defectors: for 0, 1, ... of the others.
+        frames: of those who cooperate, and of those who defect.
+        cooperators, defectors: the mean of what they are paid in an episode, for 0, 1, ... of the others.
+        cooperators_se, defectors_se: the standard errors of these means over rooms.
     """
 
+    frames: tuple[str, str]
     cooperators: tuple[float, ...]
     defectors: tuple[float, ...]
+    cooperators_se: tuple[float, ...]
+    defectors_se: tuple[float, ...]
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -45,13 +50,31 @@ class Schelling:
         """Whether each gains by defecting, and all lose by it."""
         return min(self.gains) > _LEAST and self.cooperators[-1] - self.defectors[0] > _LEAST
 
+    @property
+    def verdict(self) -> str:
+        """Whether it is a dilemma, and why, in a sentence."""
+        least, most = min(self.gains), max(self.gains)
+        together = f"if all cooperate each is paid {self.cooperators[-1]:.3f}, if nobody does {self.defectors[0]:.3f}"
+        if self.is_dilemma:
+            gain = f"{least:.3f}" if most - least < 0.0005 else f"{least:.3f} to {most:.3f}"
+            return f"a dilemma: to defect gains {gain}, however many others cooperate, and {together}"
+        if least <= _LEAST:
+            others = self.gains.index(least)
+            told = f"while {others} of {len(self.gains) - 1} others cooperate, to defect gains {least:.3f}"
+            return f"no dilemma: {told}"
+        return f"no dilemma: {together}"
+
     def __str__(self) -> str:
         most = len(self.cooperators) - 1
         told = [
             f"while {others} of {most} others cooperate, to cooperate pays {c:.3f} and to defect {d:.3f}"
             for others, (c, d) in enumerate(zip(self.cooperators, self.defectors, strict=True))
         ]
-        return "; ".join(told)
+        return "; ".join([self.verdict, *told])
+
+    def figures(self) -> dict[str, Any]:
+        """The figures as a JSON-able object."""
+        return {**asdict(self), "is_dilemma": self.is_dilemma, "verdict": self.verdict}
 
 
 def schelling(loaded: LoadedScenario, frames: Sequence[str], rooms: int, seed: int) -> Schelling:
@@ -68,16 +91,20 @@ def schelling(loaded: LoadedScenario, frames: Sequence[str], rooms: int, seed: i
     """
     names = tuple(map(str, compile_program(loaded).seats))
     count = len(names)
-    paid: dict[tuple[bool, int], list[float]] = {}
+    paid: dict[tuple[bool, int], list[NDArray[np.float64]]] = {}
     for together in range(count + 1):
         for first in range(count if 0 < together < count else 1):
             joined = [(seat - first) % count < together for seat in range(count)]
             played = following(loaded, {n: frames[not one] for n, one in zip(names, joined, strict=True)})
-            returns = returns_of_scripts(compile_program(played), rooms, seed).mean(axis=0)
-            for cooperates, found in zip(joined, returns.tolist(), strict=True):
+            returns = returns_of_scripts(compile_program(played), rooms, seed)
+            for cooperates, found in zip(joined, returns.T, strict=True):
                 paid.setdefault((cooperates, together - cooperates), []).append(found)
-    means = {key: sum(found) / len(found) for key, found in paid.items()}
-    return Schelling(*(tuple(means[who, others] for others in range(count)) for who in (True, False)))
+    means, errors = [], []
+    for who in (True, False):
+        by_room = [np.mean(paid[who, others], axis=0) for others in range(count)]
+        means.append(tuple(float(found.mean()) for found in by_room))
+        errors.append(tuple(float(found.std(ddof=1) / rooms**0.5) if rooms > 1 else 0.0 for found in by_room))
+    return Schelling((frames[0], frames[1]), *means, *errors)
 
 
 def compile_program(loaded: LoadedScenario) -> Program:

@@ -316,7 +316,8 @@ def _dilemma(trial: Trial, plan: PropertyPlan) -> Report:
     rooms = trial.effort.rooms
     found = schelling(trial.loaded, plan.frames, rooms, trial.effort.seed)
     verdict = Verdict.HOLDS if found.is_dilemma else Verdict.FAILS
-    return Report(verdict, rooms, rooms if found.is_dilemma else 0, 0, (), str(found), rooms)
+    held = rooms if found.is_dilemma else 0
+    return Report(verdict, rooms, held, 0, (), str(found), rooms, schelling=found)
 
 
 def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:

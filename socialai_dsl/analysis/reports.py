@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.dilemma import Schelling
 from socialai_dsl.analysis.leaks import SOMEBODY
 from socialai_dsl.envs.told_apart import Value
 
@@ -42,6 +43,7 @@ class Report:
         acts: what is done in the first of `against`, as it is typed, where that is known.
         so: of each room that says something, where rooms are looked at one by one: whether it is so there, or whether a
             script or rival solves it. apart: how many are so, of how many, by draws and their values (`results_by`).
+        schelling: of `dilemma`, what players are paid.
     """
 
     verdict: Verdict
@@ -55,6 +57,7 @@ class Report:
     acts: tuple[str, ...] = ()
     so: Mapping[int, bool] = field(default_factory=dict, repr=False)
     apart: Mapping[Value, tuple[int, int]] = field(default_factory=dict)
+    schelling: Schelling | None = None
 
     def told_apart(self, rooms: Mapping[Value, NDArray[np.int64]]) -> Report:
         """The same with figures for each value of draws, of which the numbers of the rooms are given."""

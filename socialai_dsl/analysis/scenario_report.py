@@ -170,6 +170,7 @@ class ScenarioReport:
                     "against": list(report.against),
                     "said": report.said,
                     "results_by": _apart(report),
+                    **({} if report.schelling is None else {"schelling": report.schelling.figures()}),
                 }
                 for plan, report in self.tried
             ],

@@ -2,7 +2,9 @@
 
 import argparse
 import sys
-from typing import Final
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
 
 from socialai_dsl.analysis.effort import EPISODES, Effort
 from socialai_dsl.cli.arguments import (
@@ -17,11 +19,12 @@ from socialai_dsl.cli.arguments import (
 )
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine, json_text
+from socialai_dsl.runs.report import require_libraries
 
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
 _OF_PART: Final = {
-    "claims": ("deep", "strict", "rooms", "states"),
+    "claims": ("deep", "strict", "rooms", "states", "pictures"),
     "coverage": ("agent", "episodes", "fail_under"),
     "script": ("rooms", "states"),
 }
@@ -78,6 +81,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PERCENT",
         help="for coverage: exit with 1 if less than this share happened",
     )
+    parser.add_argument(
+        "--pictures",
+        type=Path,
+        metavar="DIR",
+        help="for claims: draw the diagram of each claim `dilemma` there, as PNG and SVG",
+    )
     parser.add_argument("--json", action="store_true", help="print the reports as a JSON array")
     parser.add_argument(
         "--strict", action="store_true", help="for claims: also fail for warnings and for what is undecided"
@@ -89,6 +98,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.evaluation.checks import Asked, check
 
     _refuse_what_does_not_apply(arguments)
+    if arguments.pictures is not None:
+        require_libraries("matplotlib")
     given = typed_options(arguments, ("rooms", "states", "episodes"))
     asked = Asked(
         arguments.scenarios,
@@ -104,11 +115,24 @@ def execute(arguments: argparse.Namespace) -> Exit:
     progress = ProgressLine(sys.stderr)
     found = check(asked, progress.show, None if arguments.json else progress.above(sys.stdout))
     progress.clear()
+    documents = [result.document for result in found.results]
     if arguments.json:
-        print(json_text([result.document for result in found.results]))
+        print(json_text(documents))
+    if arguments.pictures is not None:
+        _draw(documents, arguments.pictures)
     if found.interrupted:
         return Exit.INTERRUPTED
     return Exit.FINDINGS if any(result.failed for result in found.results) else Exit.GOOD
+
+
+def _draw(documents: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    from socialai_dsl.reporting.dilemma import draw_dilemmas  # it loads Matplotlib
+
+    drawn = draw_dilemmas(documents, folder)
+    for file in drawn:
+        print(f"written to {file}", file=sys.stderr)
+    if not drawn:
+        print("nothing to draw: no scenario claims to be a dilemma", file=sys.stderr)
 
 
 def _refuse_what_does_not_apply(arguments: argparse.Namespace) -> None:
