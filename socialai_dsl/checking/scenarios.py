@@ -230,11 +230,15 @@ def _keep_alone(name: str, keys: dict[str, Node], bag: DiagnosticBag) -> None:
     """Leave out what only groups have: `count`, and lists of one value for each."""
     if "count" in keys:
         bag.error("S101", "there is one agent, so it has no `count`", keys.pop("count").key_span())
-    for key in [key for key in keys if did_you_mean(key, [*_KEYS, "count"]) == "count"]:
+    misspelt = [key for key in keys if did_you_mean(key, [*_KEYS, "count"]) == "count"]
+    for key in misspelt:
         message = f"unknown key `{key}` in a member of the cast"
         bag.error("S101", message, keys.pop(key).key_span(), suggestion="count")
     for key in _ONE_EACH[:-1]:
         if key in keys and isinstance(keys[key].children, list):
+            if misspelt:  # a group's list is right
+                del keys[key]
+                continue
             message = f"a list gives one `{key}` to each of a group; `{name}` is only one"
             hint = None if name == _AGENT else "a group has a `count`; alternatives are drawn by pick(a | b)"
             data = keys[key].data

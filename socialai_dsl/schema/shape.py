@@ -304,9 +304,10 @@ def _elements(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _looks_like(part: Node, models: list[type[BaseModel]]) -> bool:
-    """Whether a mapping has keys of one of some models."""
+    """Whether a mapping has keys of one of some models, also if they are misspelt."""
     keys = part.children if isinstance(part.children, dict) else ()
-    return any(key in keys_of(model) for model in models for key in keys)
+    known = [keys_of(model) for model in models]
+    return any(key in own or did_you_mean(key, own) is not None for own in known for key in keys)
 
 
 # -- models --------------------------------------------------------------------------------------------------

@@ -31,14 +31,26 @@ Site = tuple[int, int, str]
 
 def keys_misspelt(text: str) -> Iterator[Site]:
     """Two letters of a key change places."""
+    sections = re.findall(
+        r"^(?:let|looks|tables|define|parameters|cast|objects|frames|rivals|probes):.*\n((?:  .*\n|\n)*)",
+        text,
+        re.MULTILINE,
+    )
+    names = {name for section in sections for name in re.findall(r"^  ([a-z_]+)\b", section, re.MULTILINE)}
+    names |= {
+        name
+        for line in re.findall(r"\b(?:slots|let|set|with):(.*)", text)
+        for name in re.findall(r"\b([a-z_]+):", line)
+    }
     for found in re.finditer(r"(?:^ *(?:- )?|[{,] *)([a-z_]+):(?= |$)", text, re.MULTILINE):
-        if found[1] in KEYS and f"${found[1]}" not in text:  # a parameter may be called like a key
+        # A parameter, a value or a table may be called like a key.
+        if found[1] in KEYS - names and f"${found[1]}" not in text:
             yield found.start(1), found.end(1), slip(found[1])
 
 
 def names_misspelt(text: str) -> Iterator[Site]:
     """Two letters of a name that something is done with change places."""
-    for found in re.finditer(r"\b([a-z_]{4,})\.(?:is|color|at|next_to|gone)\b", text):
+    for found in re.finditer(r"(?<![.\w])([a-z_]{4,})\.(?:is|color|at|next_to|gone)\b", text):
         yield found.start(1), found.end(1), slip(found[1])
 
 

@@ -88,6 +88,7 @@ def test_what_is_no_cast_is_left_to_others(cast):
             "1 given for 2: a list has one for each member of the group",
         ),
         ("peers: {cuont: 2}", "S101", "unknown key `cuont` in a member of the cast"),
+        ("peers: {cuont: 2, name: [Ann, Bob]}", "S101", "unknown key `cuont` in a member of the cast"),
         ('"peers[0]": {}', "S104", "`peers[0]` is not a name"),
         ("bob: {name: [Bob, Cy]}", "S104", "a list gives one `name` to each of a group; `bob` is only one"),
         ("agent: {count: 2}", "S101", "there is one agent, so it has no `count`"),
