@@ -10,7 +10,7 @@ from hashlib import sha256
 from itertools import chain
 from typing import Any, Self
 
-from socialai_dsl.program import CHANNELS, Outcome, Program
+from socialai_dsl.program import CHANNELS, FrameColumn, Header, Outcome, Program
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Positions = tuple[int, ...]
@@ -124,6 +124,16 @@ def seats_of(playable: Playable) -> tuple[str, ...]:
     programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
     names = [tuple(map(str, program.seats)) for program in programs]
     return names[0] if len(set(names)) == 1 else names[0][:1]
+
+
+def has_script(playable: Playable, seat: str) -> bool:
+    """Whether a member of the cast follows a frame; of a suite, in all its programs."""
+    programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
+    for program in programs:
+        framed = program.table(Header.FRAME_AT)[:, FrameColumn.ENTITY].tolist()
+        if seat not in [str(program.entities[number]) for number in framed]:
+            return False
+    return True
 
 
 def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:

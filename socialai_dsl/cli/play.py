@@ -9,6 +9,7 @@ from socialai_dsl.cli.arguments import (
     TELL_OPTIONS,
     add_participant,
     add_scenario,
+    add_seats,
     add_tell,
     seed,
     typed_options,
@@ -37,12 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder that gets a folder of this session with every step (default: {HUMAN_FOLDER})",
     )
+    add_seats(parser)
     add_participant(parser)
     parser.add_argument(
         "--view",
         choices=("room", "seat"),
         default="room",
-        help="show the whole room (default), or what the agent sees and nothing else",
+        help="show the whole room (default), or what is seen from the seat and nothing else",
     )
     add_tell(parser)
 
@@ -52,9 +54,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.evaluation.people import play_seed
 
     told = typed_options(arguments, TELL_OPTIONS)
-    played, folder = play_seed(
-        arguments.scenario, arguments.seed, arguments.out, arguments.participant, arguments.view, **told
-    )
+    asked = arguments.scenario, arguments.seed, arguments.out, arguments.participant, arguments.view
+    played, folder = play_seed(*asked, arguments.seat, **told)
     for episode in played:
         print(printable(str(episode)))
     print(f"every step is in {folder}", file=sys.stderr)

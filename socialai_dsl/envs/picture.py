@@ -39,7 +39,7 @@ class Scene:
 
     Attributes:
         codes: uint8 (H, W, 4), each cell's type, colour, status and orientation, without who has the seat.
-        agent: x, y, direction of who has the seat.
+        agent: x, y, direction of who has the seat; x and y are -1 once it has left the room.
         seen: bool (H, W), the cells in its field of view.
         below: (x, y) -> the object in whose cell an NPC stands.
         gestures: (x, y) -> where the NPC there points and what it did last.
@@ -89,6 +89,9 @@ def scene(table: Table, row: int, seat: int = 0) -> Scene:
 
 
 def _pose(fields: NDArray[np.int32]) -> tuple[int, int, int]:
+    """X, y, direction; x and y are -1 of one who has left the room."""
+    if fields[Field.GONE]:
+        return -1, -1, int(fields[Field.DIR])
     return int(fields[Field.X]), int(fields[Field.Y]), int(fields[Field.DIR])
 
 
@@ -260,5 +263,5 @@ def _seen(table: Table, row: int, pose: tuple[int, int, int]) -> NDArray[np.bool
     dx, dy = xs - x, ys - y
     ahead_x, ahead_y = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction]
     ahead, aside = dx * ahead_x + dy * ahead_y, -dx * ahead_y + dy * ahead_x
-    seen: NDArray[np.bool_] = (ahead >= 0) & (ahead < VIEW) & (abs(aside) <= VIEW // 2)
+    seen: NDArray[np.bool_] = (x >= 0) & (ahead >= 0) & (ahead < VIEW) & (abs(aside) <= VIEW // 2)
     return seen

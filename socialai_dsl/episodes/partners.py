@@ -19,7 +19,7 @@ from socialai_dsl.episodes.players import Player, make_policy, named_agent, requ
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.errors import OptionError, UsageError
-from socialai_dsl.program_suite import Playable, seats_of
+from socialai_dsl.program_suite import Playable, has_script, seats_of
 
 Partners = Mapping[Seat, Player]
 """Who plays on seats that the one in question does not play."""
@@ -89,6 +89,8 @@ def seating(
 
 def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | Policy:
     if player.is_script:
+        if not has_script(program, seat):
+            raise OptionError(_SEAT, f"got 'script' for {seat}, which follows no frame, so it has no script")
         return SCRIPT
     if player.agent == RANDOM and player.policy is None:
         return RANDOM

@@ -47,6 +47,16 @@ class Remembering:
                 self.act(observation)
 
 
+def remembering(
+    seats: Mapping[Seat, Any] | None,
+) -> tuple[dict[Seat, Any] | None, list[Remembering]]:
+    """Who fills other seats, as `make` takes it, with policies that can be taken back, and these policies."""
+    if seats is None:
+        return None, []
+    filled = {seat: one if isinstance(one, str) else Remembering(one) for seat, one in seats.items()}
+    return filled, [one for one in filled.values() if isinstance(one, Remembering)]
+
+
 @dataclass(frozen=True, eq=False)
 class StageMoment:
     """A moment of an episode.

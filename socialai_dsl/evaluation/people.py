@@ -1,9 +1,12 @@
 """People play at the terminal: the rooms of a seed for as long as they like, or the test set."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from socialai_dsl.checking.briefing import Briefing, brief
+from socialai_dsl.envs.factory import compiled
+from socialai_dsl.episodes.partners import partners_of, seating
 from socialai_dsl.episodes.players import HUMAN_FOLDER, Player, session_folder
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
@@ -19,6 +22,7 @@ def play_seed(
     out: Path = HUMAN_FOLDER,
     participant: str | None = None,
     view: "Sight" = "room",
+    seats: Sequence[tuple[str, str]] = (),
     **told: Any,
 ) -> "tuple[list[FinishedEpisode], Path]":
     """Let a person play until they quit, as `socialai play` does.
@@ -28,7 +32,8 @@ def play_seed(
         seed: of the first episode; later episodes have the next seeds.
         out: gets a folder of the session.
         participant: begins the name of that folder.
-        view: whether the person sees what the agent sees, or the whole room.
+        view: whether the person sees what its seat sees, or the whole room.
+        seats: who plays other members of the cast, see `partners_of`; the person has the first seat that is left.
         told: what they are told of the task, see `brief`.
 
     Returns:
@@ -36,20 +41,24 @@ def play_seed(
 
     Raises:
         ScenarioError: the scenario has mistakes.
-        UsageError: there is no terminal.
+        UsageError: there is no terminal, or nobody can sit there so.
         OSError: the folder cannot be written.
     """
     from socialai_dsl.play import play
 
-    briefing, name = brief(load(scenario), **told), scenario_folder_name(scenario)
+    loaded = load(scenario)
+    briefing, name = brief(loaded, **told), scenario_folder_name(scenario)
+    partners = partners_of(seats, scenario, compiled(loaded)) if seats else {}
+    loaded, filled = seating(partners, scenario, loaded)
     session = session_folder(out, participant)
 
     def episode(number: int) -> tuple[str, dict[str, Any]]:
         own = seed + number
         return f"{name}, seed {own}", {"seed": own}
 
-    about = {"session": session.name, "scenario": name}
-    return play(scenario, episode, session / name, about, briefing, view), session / name
+    about = {"session": session.name, "scenario": name, **({"seats": dict(seats)} if seats else {})}
+    found = play(scenario, episode, session / name, about, briefing, view, seats=filled, loaded=loaded)
+    return found, session / name
 
 
 def play_test_episodes(

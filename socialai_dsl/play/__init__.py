@@ -11,6 +11,7 @@ from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.briefing import Briefing
+    from socialai_dsl.frontend import Loaded
     from socialai_dsl.play.game import FinishedEpisode, Sight
     from socialai_dsl.play.screen import Episodes
 
@@ -25,6 +26,8 @@ def play(
     briefing: "Briefing | None" = None,
     view: "Sight" = "room",
     practice: bool = True,
+    seats: Mapping[str, Any] | None = None,
+    loaded: "Loaded | None" = None,
 ) -> "list[FinishedEpisode]":
     """Let a person at the terminal play; the episodes that were played to their end.
 
@@ -36,8 +39,10 @@ def play(
         folder: is made, and holds no other session.
         about: what the file says of the session.
         briefing: what the person is told of the task; None: what the scenario's file says.
-        view: whether the person sees what the agent sees, or the whole room.
+        view: whether the person sees what its seat sees, or the whole room.
         practice: whether steps may be taken back and the like.
+        seats: who fills other seats, as `make` takes it; the person has the first that is left.
+        loaded: what is played, if that is loaded already.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -49,8 +54,8 @@ def play(
     from socialai_dsl.play.journal import FILE, Journal
     from socialai_dsl.play.screen import PlayApp
 
-    game = Game(scenario, briefing)
-    session = {**about, **game.briefing.record(), "view": view, "practice": practice}
+    game = Game(scenario, briefing, seats, loaded)
+    session = {**about, "seat": game.own, **game.briefing.record(), "view": view, "practice": practice}
     try:
         with Journal(folder / FILE, session) as game.journal:
             first = episodes(0)

@@ -1,7 +1,7 @@
 """A person's game: the episode so far, its dialogue, and every step back to its start."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -9,24 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.briefing import Briefing, brief
+from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.envs.factory import make
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.view import View
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step
-from socialai_dsl.episodes.stage import Stage
-from socialai_dsl.frontend import load
+from socialai_dsl.episodes.play import Observer, Rooms, Step
+from socialai_dsl.episodes.stage import Stage, remembering
+from socialai_dsl.frontend import Loaded, load
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.play.journal import Journal, read_journal
-from socialai_dsl.program_suite import Playable, outcome_name
+from socialai_dsl.program_suite import Playable, outcome_name, seats_of
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.semantics.typed import Phrases
+from socialai_dsl.traces import state as traced
 from socialai_dsl.traces.endings import Ending, endings_of
-from socialai_dsl.traces.state import cast_of, present
+from socialai_dsl.traces.state import cast_of, names_of, present
 from socialai_dsl.traces.steps import describe_step
 from socialai_dsl.vocabulary import spelt
 
 Sight = Literal["seat", "room"]
-"""What a person sees: what the agent sees, or the whole room."""
+"""What a person sees: what its seat sees, or the whole room."""
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
 """What `describe` says of a member that is shown otherwise, or only counts."""
 
@@ -50,9 +52,9 @@ class GameMoment:
     """A moment of an episode.
 
     Attributes:
-        view: what the agent sees, uint8 (7, 7, C). seen: the same and what it hears, as text with escape codes.
+        view: what is seen from the seat, uint8 (7, 7, C). seen: the same and what is heard, as text with escape codes.
         member: of a suite, which scenario is played.
-        action: what led here, int64 (heads,); None before the first step.
+        action: what led here, int64 (heads,); None before the first step. others: the same of those on other seats.
         lines: what was said and heard so far.
         reward: sum of the rewards so far.
         ended: how the episode ended; None while it has not.
@@ -62,6 +64,7 @@ class GameMoment:
     seen: str
     member: str | None
     action: NDArray[np.int64] | None = None
+    others: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     lines: tuple[DialogueLine, ...] = ()
     reward: float = 0.0
     ended: EpisodeEnd | None = None
@@ -76,12 +79,14 @@ class FinishedEpisode:
         actions: int64 (heads,) each.
         reward: sum of the rewards.
         ended: how it ended.
+        others: of each other seat on which somebody sat its actions, likewise.
     """
 
     title: str
     actions: list[NDArray[np.int64]]
     reward: float
     ended: EpisodeEnd
+    others: Mapping[str, list[NDArray[np.int64]]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """One line: which, how, after how many steps."""
@@ -98,25 +103,33 @@ def finished_episodes(file: Path) -> list[FinishedEpisode]:
         ValueError: it is no journal.
     """
     played: list[FinishedEpisode] = []
-    title, actions = "", list[NDArray[np.int64]]()
+    title, steps = "", list[dict[str, Any]]()
     for event in read_journal(file):
         match event["event"]:
             case "episode":
-                title, actions = event["title"], []
+                title, steps = event["title"], []
             case "step":
-                actions.append(np.array(event["action"], np.int64))
+                steps.append(event)
             case "undo":
-                del actions[event["t"] :]
+                del steps[event["t"] :]
             case "end":
                 ended = EpisodeEnd(event["outcome"], event["success"], event["text"])
-                played.append(FinishedEpisode(title, list(actions), event["reward"], ended))
+                actions = [np.array(step["action"], np.int64) for step in steps]
+                others = _by_seat([step.get("others", {}) for step in steps])
+                played.append(FinishedEpisode(title, actions, event["reward"], ended, others))
     return played
 
 
+def _by_seat(others: Sequence[Mapping[str, Any]]) -> dict[str, list[NDArray[np.int64]]]:
+    """The actions of other seats by seat, from those of each step."""
+    return {seat: [np.array(step[seat], np.int64) for step in others] for seat in (others or [{}])[0]}
+
+
 class Game(Observer):
-    """An episode with a person on the agent's seat, and everything that happened in it.
+    """An episode with a person on a seat, and everything that happened in it.
 
     Attributes:
+        own: the seat, as the member of the cast is called in the file.
         title: which episode is played.
         phrases: what can be done and said.
         briefing: what the player is told of the task.
@@ -125,15 +138,26 @@ class Game(Observer):
     Args:
         scenario: a path or a name.
         briefing: None: what the scenario's file says.
+        seats: who fills other seats, as `make` takes it; the person has the first that is left.
+        loaded: what is played, if that is loaded already.
 
     Raises:
         ScenarioError: the scenario has mistakes.
+        ValueError: there is no such seat, or none is left.
     """
 
-    def __init__(self, scenario: str, briefing: Briefing | None = None) -> None:
-        loaded = load(scenario)
-        self._stage = Stage(make(scenario), [self])
-        self._env: ScenarioEnv = self._stage.env
+    def __init__(
+        self,
+        scenario: str,
+        briefing: Briefing | None = None,
+        seats: Mapping[str, Any] | None = None,
+        loaded: Loaded | None = None,
+    ) -> None:
+        loaded = load(scenario) if loaded is None else loaded
+        company, partners = remembering(seats)
+        env = ScenarioEnv(compiled(loaded), scenarios=scenarios_of(loaded), seats=company)
+        self._stage = Stage(env, [self], partners)
+        self._env, self.own = env, self._stage.own
         self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
         self._text_view = TextView(self._program, "grid", colour=True)
@@ -160,9 +184,12 @@ class Game(Observer):
             ValueError: it cannot be done or said; the message says what was probably meant.
         """
         action = self._env.encode_action((movement, sentence))
-        step = self._stage.step({AGENT: action[None]})
-        reward = float(step.reward[0])
-        self._note("step", t=self.steps, action=action.tolist(), did=movement, said=sentence, reward=reward)
+        step = self._stage.step({self.own: action[None]})
+        reward, others = float(step.reward[0]), self.now.others
+        told = {"others": {seat: one.tolist() for seat, one in others.items()}} if others else {}
+        self._note(
+            "step", t=self.steps, action=action.tolist(), did=movement, said=sentence, reward=reward, **told
+        )
         if (ended := self.now.ended) is not None:
             self._note("end", **vars(ended), steps=self.steps, reward=self.now.reward)
 
@@ -175,13 +202,13 @@ class Game(Observer):
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
-        image, info = rooms.observations[AGENT]["image"][0], rooms.info
+        image, info = rooms.observations[self.own]["image"][0], rooms.info
         self._moments = [GameMoment(image, self._seen(image, info), info.get("member"))]
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
-        before, info, action = self.now, step.info, step.actions[AGENT][0]
-        image = rooms.observations[AGENT]["image"][0]
+        before, info, action = self.now, step.info, step.actions[self.own][0]
+        image = rooms.observations[self.own]["image"][0]
         words = describe_step(self._program, action, len(self._moments), info["utterance"])
         movement = (*self._program.actions, None)[action[0]]
         self._moments.append(
@@ -190,11 +217,17 @@ class Game(Observer):
                 self._seen(image, info, LastStep(movement, before.view)),
                 info.get("member"),
                 action,
+                self._others(),
                 (*before.lines, *words.dialogue),
                 before.reward + float(step.reward[0]),
                 self._ended(info) if step.ended[0] else None,
             )
         )
+
+    def _others(self) -> dict[str, NDArray[np.int64]]:
+        """What those on other seats did in the last step."""
+        found = {seat: self._env.seat_moment(seat).action for seat in self._env.seats if seat != self.own}
+        return {seat: action for seat, action in found.items() if action is not None}
 
     def back(self, rooms: Rooms) -> None:
         """See `Observer.back`."""
@@ -212,7 +245,7 @@ class Game(Observer):
 
     @property
     def explanation(self) -> str:
-        """How to read what is seen from the agent's seat."""
+        """How to read what is seen from the seat."""
         return self._text_view.explanation()
 
     @property
@@ -225,12 +258,13 @@ class Game(Observer):
         return self._env.coloured_text()
 
     def view(self) -> View:
-        """The agent's view."""
+        """The view from the seat."""
         return self._env.view(self.now.view)
 
     def place(self) -> tuple[int, int] | None:
-        """X and y of the agent; None if it has left."""
-        at = self._env.describe()["agent"]["at"]
+        """X and y of who has the seat; None if it has left."""
+        member = traced.found(self._env.describe(), self.own) or {}
+        at = member.get("at")
         return None if at is None else (at[0], at[1])
 
     def backstage(self) -> list[str]:
@@ -251,13 +285,22 @@ class Game(Observer):
             ]
         return lines
 
+    @property
+    def name(self) -> str | None:
+        """The name by which others hear the person; None where there is one seat."""
+        if len(seats_of(self._program)) == 1:
+            return None
+        return names_of(self._env.scenario, self._env.describe())[self.own]
+
     def played(self) -> FinishedEpisode | None:
         """The episode, if it has ended."""
         ended = self.now.ended
         if ended is None:
             return None
-        actions = [moment.action for moment in self._moments if moment.action is not None]
-        return FinishedEpisode(self.title, actions, self.now.reward, ended)
+        steps = self._moments[1:]
+        actions = [moment.action for moment in steps if moment.action is not None]
+        others = _by_seat([moment.others for moment in steps])
+        return FinishedEpisode(self.title, actions, self.now.reward, ended, others)
 
     def close(self) -> None:
         """Let the environment go."""

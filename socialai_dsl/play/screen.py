@@ -52,7 +52,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         game: what is played; its first episode has begun.
         episodes: which ones there are.
         practice: whether steps may be taken back, episodes begun again, and states of frames looked at.
-        view: whether the player sees what the agent sees, or the whole room.
+        view: whether the player sees what its seat sees, or the whole room.
 
     Returns, from `run`, the episodes that were played to their end.
 
@@ -187,7 +187,7 @@ class PlayApp(App[list[FinishedEpisode]]):
 
     @property
     def _walks(self) -> bool:
-        """Whether keys move the agent."""
+        """Whether keys move the player."""
         return self.focused is None and len(self.screen_stack) == 1
 
     def action_type(self) -> None:
@@ -276,7 +276,8 @@ class PlayApp(App[list[FinishedEpisode]]):
     def show(self, message: str = "") -> None:
         """Show where the game stands."""
         game, now = self._game, self._game.now
-        parts = [game.title, f"step {game.steps}"]
+        named = [] if game.name is None else [f"you are {game.name}"]
+        parts = [game.title, *named, f"step {game.steps}"]
         if not self._is_seated:
             parts[1:1] = [now.member] if now.member is not None else []
             parts.append(f"reward {now.reward:.3f}")
@@ -289,7 +290,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         if self.query_one("#right").has_class("behind"):
             self.query_one("#states", Static).update(Text("\n".join(map(printable, game.backstage()))))
         if now.ended is None:
-            self.tell(message)
+            self.tell(message or ("" if game.place() else "you have left the room; . lets the others go on"))
             return
         verdict = "success" if now.ended.success else "no success"
         after = f"after {game.steps} steps"
@@ -302,7 +303,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         )
 
     def _show_room(self) -> None:
-        """The whole room, and beside it what the agent sees."""
+        """The whole room, and beside it what is seen from the seat."""
         game, view = self._game, self._game.view()
         self.query_one("#room", Static).update(Text.from_ansi(game.room()))
         self.query_one("#view", Static).update(Text.from_ansi(view.text))
@@ -326,7 +327,7 @@ class PlayApp(App[list[FinishedEpisode]]):
         return Text.assemble((f"{line.t:>3} ", "dim"), (f"{name}: ", style), (printable(line.text), current))
 
     def _follow(self) -> None:
-        """Keep the agent in sight where the room is larger than its panel."""
+        """Keep the player in sight where the room is larger than its panel."""
         place = self._game.place()
         if place is not None:
             left = self.query_one("#left")
@@ -505,9 +506,9 @@ def _key(movement: str) -> str:
 
 
 _ROOM: Final = (
-    "In the room the agent is an arrow alone. Av is an NPC of kind A that looks down. Other things begin with their "
+    "In the room you are an arrow alone. Av is an NPC of kind A that looks down. Other things begin with their "
     "colour, e for grey: gD is a closed green door, gL a locked one, g/ an open one. The lighter cells can be in view; "
-    "what the agent is given of them is on the right."
+    "what you are given of them as a player is on the right."
 )
 
 

@@ -110,6 +110,30 @@ class Reply(_Part):
     error: str = ""
 
 
+class SeatPart(_Part):
+    """A moment for one of the seats behind the agent's; the attributes mean what they mean for a moment.
+
+    Attributes:
+        action, did, said: of its member. `action` and `said` are None where its script plays: then others hear what it
+            says.
+        heard: lines that it heard.
+        reward: of the step, to this seat.
+        success: whether the episode was a success of this seat; None until it has ended.
+        view, view_gestures, view_held, view_marks: what it sees.
+    """
+
+    action: tuple[_Number, ...] | None = None
+    did: str | None = None
+    said: str | None = None
+    heard: list[Line] = []
+    reward: float = 0.0
+    success: bool | None = None
+    view: list[_Number] | None = None
+    view_gestures: list[Gesture] = []
+    view_held: list[tuple[_Number, _Number]] = []
+    view_marks: list[tuple[_Number, _Number]] = []
+
+
 class Moment(_Part):
     """The room after a step, before the first one, or where a language model ended the episode without a step.
 
@@ -121,7 +145,7 @@ class Moment(_Part):
         member: of a suite, what is played from here on. cast: the NPCs, where they are others.
         room: width and height, where it is another room; then `cells` has every cell.
         cells: pairs of a cell and the number of its look.
-        agent: x, y and direction.
+        agent: x, y and direction; x and y are -1 once it has left the room.
         below: pairs of a cell where an NPC stands and the number of the look of the object there.
         gestures: what NPCs show. held: pairs of a cell and the number of the look of what is carried there.
         view: the agent's own view, 7 rows of 7 numbers of looks; the agent stands in the middle of the last row and
@@ -135,10 +159,11 @@ class Moment(_Part):
         did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
         reward: of the step.
+        seats: the same for the other seats of the trace, in their order.
         fired: numbers of rules. others: pairs of a rule that was asked and did not fire, and the number of its reason.
-        thought: what the agent made of the moment before, from which its action was chosen.
+        thought: what the player made of the moment before, from which its action was chosen.
         replies: what a language model answered to the moment before, until it gave an action or its turn passed.
-        ended: how the episode ended in this step.
+        ended: how the episode ended in this step, for the agent.
     """
 
     t: _Number
@@ -161,6 +186,7 @@ class Moment(_Part):
     said: str | None = None
     heard: list[Line] = []
     reward: float = 0.0
+    seats: list[SeatPart] = []
     fired: list[_Number] = []
     others: list[tuple[_Number, _Number]] = []
     thought: Thought | None = None
@@ -176,6 +202,9 @@ class Trace(_Part):
         scenario: its name, as it was asked for.
         about: the scenario's own sentence about itself.
         agent: the player, in words.
+        seats: the members of the cast with a seat, the agent first, where there are several; moments are the agent's,
+            whoever plays. names: by which they are heard.
+        own: the seat of the player. players: who has the others, in words.
         episode: which episode it was, in words.
         actions: words of the body actions; one more index is no movement.
         templates: words of the templates.
@@ -192,6 +221,10 @@ class Trace(_Part):
     scenario: str
     about: str = ""
     agent: str
+    seats: list[str] = []
+    names: list[str] = []
+    own: str = "agent"
+    players: dict[str, str] = {}
     episode: str
     actions: list[str]
     templates: list[str]
@@ -205,9 +238,11 @@ class Trace(_Part):
 
     @property
     def succeeded(self) -> bool:
-        """Whether the episode ended in success."""
-        ended = self.moments[-1].ended
-        return ended is not None and ended.success
+        """Whether the episode ended in success of the player."""
+        last = self.moments[-1]
+        if self.own != "agent":
+            return bool(last.seats[self.seats.index(self.own) - 1].success)
+        return last.ended is not None and last.ended.success
 
     def fired(self, moment: Moment) -> list[Rule]:
         """The rules that fired in the step before a moment."""
@@ -220,7 +255,8 @@ class Trace(_Part):
     def portable(self) -> Trace:
         """The same without the folders of this machine: files are called as `short_file` calls them."""
         rules = [rule.model_copy(update={"at": _short_place(rule.at)}) for rule in self.rules]
-        names = {"scenario": short_name(self.scenario), "agent": short_name(self.agent)}
+        names: dict[str, Any] = {"scenario": short_name(self.scenario), "agent": short_name(self.agent)}
+        names["players"] = {seat: short_name(player) for seat, player in self.players.items()}
         return self.model_copy(update={**names, "rules": rules})
 
     def as_json(self) -> str:

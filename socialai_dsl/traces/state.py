@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from socialai_dsl.program import Program
+from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.semantics.terms import Const
 
 _NOT_STATE: Final = ("t", "heard", "pending", "last")
 """What `describe` says beside what the room is like."""
@@ -14,6 +16,18 @@ _NOT_STATE: Final = ("t", "heard", "pending", "last")
 def cast_of(program: Program) -> tuple[str, ...]:
     """The agent and the NPCs, by name."""
     return tuple(str(entity) for entity in program.entities if entity.role != "object")
+
+
+def names_of(scenario: CheckedScenario, described: dict[str, Any]) -> dict[str, str]:
+    """The names by which the members of the cast are heard, by what the file calls them."""
+    names = {}
+    for entity in scenario.entities:
+        if entity.role == "object":
+            continue
+        term, key = entity.name, entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+        fixed = term.type.words[term.value - term.type.low] if isinstance(term, Const) else key
+        names[key] = (found(described, key) or {}).get("name", fixed)
+    return names
 
 
 def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:

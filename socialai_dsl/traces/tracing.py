@@ -4,25 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.envs.seats import SeatMoment
+from socialai_dsl.envs.view import View
 from socialai_dsl.program import VIEW
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.marks import Marks
-from socialai_dsl.semantics.terms import Const
 from socialai_dsl.traces import document
-from socialai_dsl.traces.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
-from socialai_dsl.traces.state import leaves
+from socialai_dsl.traces.document import (
+    Line,
+    Member,
+    Moment,
+    Outcome,
+    Reply,
+    Rule,
+    SeatPart,
+    Thought,
+    Trace,
+)
+from socialai_dsl.traces.state import leaves, names_of
 from socialai_dsl.traces.steps import describe_step, heard_line
 from socialai_dsl.vocabulary import NOUN
 
 Action = NDArray[np.int64]
 Answers = Sequence[tuple[str, str]]
 """What a language model answered, each with what was wrong with it."""
+_AGENT: Final = "agent"
 _SHOWN: Final = 400
 """The most characters of an answer that are shown; a model's last words hold its action."""
 
@@ -35,7 +48,8 @@ class _Seen:
     cast: list[Member]
     room: tuple[int, int]
     cells: list[int]
-    view: list[int]
+    views: list[list[int]]
+    names: dict[str, str]
     state: dict[str, Any]
 
 
@@ -43,20 +57,28 @@ class Tracer:
     """Traces an episode while it is played; steps can be taken back.
 
     Args:
-        env: the environment that plays the episode.
+        env: the environment that plays the episode; of one made with `seats`, all seats are traced.
         scenario: its name, for people.
         agent: the player, for people.
         endings: the text to show for each outcome.
         about: a sentence about the scenario.
+        players: who has other seats than the player, for people.
 
     Attributes:
         moments: the moments so far.
+        players: see above.
     """
 
     def __init__(
-        self, env: Any, scenario: str, agent: str, endings: Mapping[str, str], about: str = ""
+        self,
+        env: Any,
+        scenario: str,
+        agent: str,
+        endings: Mapping[str, str],
+        about: str = "",
+        players: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._env, self._program = env.unwrapped, env.unwrapped.program
+        self._env, self._program, self.players = env.unwrapped, env.unwrapped.program, dict(players)
         self._scenario, self.agent, self._endings, self._about = scenario, agent, endings, about
         self._looks: dict[tuple[int, int, int, int], int] = {}
         self._marks: dict[Marks, int] = {}
@@ -69,7 +91,8 @@ class Tracer:
     def begin(self, episode: str, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> Moment:
         """Add the moment after `env.reset`, which returned these; `episode` says in words which one it is."""
         self._episode, self._seen, self.moments = episode, [], []
-        return self._add(observation, info)
+        views = self._views(observation)
+        return self._add(views, info, seats=[SeatPart(**self._seen_from(view)) for view in views[1:]])
 
     def step(
         self,
@@ -84,42 +107,68 @@ class Tracer:
         replies: Answers = (),
     ) -> Moment:
         """Add the moment after `env.step`, which returned these."""
-        step = describe_step(self._program, action, len(self.moments), info["utterance"])
-        explained = self._env.explain()
-        called = [member.name for member in self._seen[-1].cast]
-        names = {m.name: m.key for m in self._seen[-1].cast if called.count(m.name) == 1}
-        heard = [heard_line(step.t, line) for line in step.heard]
+        explained, views = self._env.explain(), self._views(observation)
+        over = self._outcome(info) if terminated or truncated else None
+        own = SeatMoment(
+            {}, dict(info), np.asarray(action), None, reward, None if over is None else over.success
+        )
+        moments = [own] if len(views) == 1 else list(map(self._env.seat_moment, self._env.seats))
+        if over is not None and over.success != moments[0].success:
+            over = over.model_copy(update={"success": bool(moments[0].success)})
+        agent, *others = map(self._part, moments)
         return self._add(
-            observation,
+            views,
             info,
-            action=tuple(int(part) for part in action),
-            did=step.action,
-            said=step.said,
-            heard=[Line(text=line.text, name=line.speaker, who=names.get(line.speaker)) for line in heard],
-            reward=round(float(reward), 6),
+            **agent,
+            seats=[
+                SeatPart(**part, **self._seen_from(view), success=moment.success)
+                for part, view, moment in zip(others, views[1:], moments[1:], strict=True)
+            ],
             fired=[self._rule(entry) for entry in explained["fired"]],
             others=[(self._rule(entry), _number(self._texts, entry["why"])) for entry in explained["others"]],
             thought=thought,
             replies=_replies(replies),
-            ended=self._outcome(info) if terminated or truncated else None,
+            ended=over,
         )
+
+    def _part(self, moment: SeatMoment) -> dict[str, Any]:
+        """What was done on a seat, and what was heard and earned there."""
+        t, utterance = len(self.moments), moment.info["utterance"]
+        nothing = np.zeros(len(self._env.action_space.nvec), np.int64)
+        step = describe_step(self._program, nothing if moment.action is None else moment.action, t, utterance)
+        called = list(self._seen[-1].names.values())
+        who = {name: key for key, name in self._seen[-1].names.items() if called.count(name) == 1}
+        heard = [heard_line(t, line) for line in step.heard]
+        return {
+            "action": None if moment.action is None else tuple(map(int, moment.action)),
+            "did": moment.did if moment.action is None else step.action,
+            "said": step.said,
+            "heard": [Line(text=line.text, name=line.speaker, who=who.get(line.speaker)) for line in heard],
+            "reward": round(float(moment.reward), 6),
+        }
+
+    def _views(self, observation: Mapping[str, NDArray[Any]]) -> list[View]:
+        """What is seen from each seat, the agent's first."""
+        seats, env = self._env.seats, self._env
+        if len(seats) == 1:
+            return [env.view(observation["image"])]
+        return [env.view(env.seat_moment(seat).observation["image"], seat) for seat in seats]
+
+    def _seen_from(self, view: View) -> dict[str, Any]:
+        """What somebody sees beside the cells of the view."""
+        return {
+            "view_gestures": _gestures(view.gestures, VIEW),
+            "view_held": [(y * VIEW + x, self._look(code)) for (x, y), code in view.held.items()],
+            "view_marks": self._marked(view.marks, VIEW),
+        }
 
     def cut_short(self, replies: Answers, ended: Outcome) -> Moment:
         """The moment in which a language model's answers without an action ended the episode."""
         last = self.moments[-1]
-        kept = {
-            name: getattr(last, name)
-            for name in (
-                "agent",
-                "below",
-                "gestures",
-                "held",
-                "marks",
-                "view_gestures",
-                "view_held",
-                "view_marks",
-            )
-        }
+        same = ("agent", "below", "gestures", "held", "marks", "view_gestures", "view_held", "view_marks")
+        kept = {name: getattr(last, name) for name in same}
+        seen = ("view_gestures", "view_held", "view_marks")
+        kept["seats"] = [SeatPart(**{name: getattr(seat, name) for name in seen}) for seat in last.seats]
         self.moments.append(Moment(t=len(self.moments), replies=_replies(replies), ended=ended, **kept))
         self._seen.append(self._seen[-1])
         return self.moments[-1]
@@ -141,6 +190,7 @@ class Tracer:
             scenario=self._scenario,
             about=self._about,
             agent=self.agent,
+            **self._seats(),
             episode=self._episode,
             actions=list(program.actions),
             templates=list(program.templates),
@@ -153,52 +203,67 @@ class Tracer:
             moments=self.moments[moments:],
         )
 
+    def _seats(self) -> dict[str, Any]:
+        """Who has which seat, where there are several."""
+        seats = self._env.seats
+        if len(seats) == 1:
+            return {}
+        names = [self._seen[0].names[seat] for seat in seats] if self._seen else []
+        own = self._env.seat_names[0]
+        return {"seats": list(seats), "names": names, "own": own, "players": self.players}
+
     def counts(self) -> Counts:
         """How many looks, marks, texts, rules and moments there are."""
         looks, marks, texts = len(self._looks), len(self._marks), len(self._texts)
         return looks, marks, texts, len(self._rules), len(self.moments)
 
-    def _add(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], **more: Any) -> Moment:
+    def _add(
+        self,
+        views: Sequence[View],
+        info: Mapping[str, Any],
+        seats: Sequence[SeatPart],
+        **more: Any,
+    ) -> Moment:
         """Add a moment, with what differs from the one before it."""
-        scene, described = self._env.scene(), self._env.describe()
-        view = self._env.view(observation["image"])
+        scene, described = self._env.scene(_AGENT), self._env.describe()
         height, width = scene.codes.shape[:2]
+        names = names_of(self._env.scenario, described)
+        cast = [
+            Member(key=str(entity), name=names[str(entity)], look=look)
+            for entity, look in self._env.looks_of_npcs().items()
+        ]
+        if len(views) == 1:
+            del names[_AGENT]
         seen = _Seen(
             info.get("member"),
-            self._cast(described),
+            cast,
             (width, height),
             self._numbers(scene.codes),
-            self._numbers(view.codes),
+            [self._numbers(view.codes) for view in views],
+            names,
             leaves(described),
         )
         before = self._seen[-1] if self._seen else None
+        seen_before = [None] * len(views) if before is None else before.views
+        of_seats = [
+            seat if now == then else seat.model_copy(update={"view": now})
+            for seat, now, then in zip(seats, seen.views[1:], seen_before[1:], strict=True)
+        ]
         moment = Moment(
             t=len(self.moments),
             agent=scene.agent,
             below=[(y * width + x, self._look(code)) for (x, y), code in scene.below.items()],
             gestures=_gestures(scene.gestures, width),
-            view_gestures=_gestures(view.gestures, view.codes.shape[1]),
             held=[(y * width + x, self._look(code)) for (x, y), code in scene.held.items()],
-            view_held=[(y * VIEW + x, self._look(code)) for (x, y), code in view.held.items()],
             marks=self._marked(scene.marks, width),
-            view_marks=self._marked(view.marks, VIEW),
+            seats=of_seats,
+            **self._seen_from(views[0]),
             **_differences(before, seen),
             **more,
         )
         self._seen.append(seen)
         self.moments.append(moment)
         return moment
-
-    def _cast(self, described: Mapping[str, Any]) -> list[Member]:
-        """The NPCs, with the names by which they are heard."""
-        names = {(entity.key, entity.index): entity.name for entity in self._env.scenario.entities}
-        members = []
-        for entity, look in self._env.looks_of_npcs().items():
-            found = described[entity.key] if entity.index is None else described[entity.key][entity.index]
-            term = names[entity.key, entity.index]
-            fixed = term.type.words[term.value - term.type.low] if isinstance(term, Const) else str(entity)
-            members.append(Member(key=str(entity), name=found.get("name", fixed), look=look))
-        return members
 
     def _numbers(self, codes: NDArray[np.uint8]) -> list[int]:
         return [self._look(tuple(code)) for row in codes.tolist() for code in row]
@@ -252,7 +317,7 @@ def _differences(before: _Seen | None, now: _Seen) -> dict[str, Any]:
             "cast": now.cast,
             "room": now.room,
             "cells": list(enumerate(now.cells)),
-            "view": now.view,
+            "view": now.views[0],
             "state": now.state,
         }
     cells = [(cell, look) for cell, look in enumerate(now.cells) if look != before.cells[cell]]
@@ -261,6 +326,6 @@ def _differences(before: _Seen | None, now: _Seen) -> dict[str, Any]:
     return {
         "cast": None if now.cast == before.cast else now.cast,
         "cells": cells,
-        "view": None if now.view == before.view else now.view,
+        "view": None if now.views[0] == before.views[0] else now.views[0],
         "state": gone | changed,
     }

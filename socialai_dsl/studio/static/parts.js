@@ -72,20 +72,23 @@ function observed(view, facing, compass) {
   return { ...view, cells, gestures };
 }
 
-/** What a person on the agent's seat gets, and nothing else. */
+/** What a person on a seat gets, and nothing else. */
 export class Seat {
   constructor() {
     this.told = make("p");
-    this.canvas = make("canvas", { role: "img", "aria-label": "what the agent sees, 7 by 7 cells; the agent looks up" });
+    this.canvas = make("canvas", { role: "img" });
     this.seen = make("pre", { "aria-live": "polite" });
-    this.root = panel("As the agent sees it", "seat", this.told, this.canvas, this.seen);
+    this.root = panel("", "seat", this.told, this.canvas, this.seen);
     /** @type {{told: string, seen: string, compass: boolean}[]} of each moment */ this.moments = [];
   }
 
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
-    const { told, seen, compass } = this.moments[step], { view, moment } = episode.scenes[step];
-    drawPicture(this.canvas, observed(view, moment.agent[2], compass), { tile: 64 });
+    const { told, seen, compass } = this.moments[step], scene = episode.scenes[step];
+    const who = episode.seats.length > 1 ? episode.called(episode.own) : AGENT, facing = episode.pose(scene, episode.own)?.[2] ?? UP;
+    drawPicture(this.canvas, observed(episode.part(scene).view, facing, compass), { tile: 64 });
+    this.canvas.setAttribute("aria-label", `what ${who} sees, 7 by 7 cells; who sees it looks up`);
+    /** @type {HTMLElement} */ (this.root.firstElementChild).textContent = `As ${who} sees it`;
     this.told.textContent = told;
     this.seen.textContent = seen;
   }
@@ -123,7 +126,7 @@ function viewOf(room, [x, y], facing, { side, cells }) {
   return view;
 }
 
-/** What somebody sees: the agent, as it is observed, or a member of the cast. */
+/** What somebody sees: the agent or another seat, as it is observed, or a member of the cast. */
 export class Views {
   /** @param {() => void} changed told when somebody else's view is to be shown */
   constructor(changed) {
@@ -132,22 +135,34 @@ export class Views {
     this.words = make("p", { class: "quiet" });
     this.root = panel("What somebody sees", "sight", this.who, this.canvas, this.words);
     /** @type {Looked | null} what the chosen member of the cast sees */ this.looked = null;
+    /** @type {string[]} the seats of the episode, whose views it has */ this.seats = [];
+    this.own = "";
   }
 
-  /** The member of the cast whose view is shown; null for the agent's. */
+  /** The member of the cast without a seat whose view is shown; null for that of a seat. */
   get member() {
-    return this.who.value && this.who.value !== AGENT ? this.who.value : null;
+    return this.who.value && this.who.value !== AGENT && !this.seats.includes(this.who.value) ? this.who.value : null;
+  }
+
+  /** Let an episode be seen from the chosen seat, at first from the player's. @param {Episode} episode @param {number} step */
+  choose(episode, step) {
+    const names = [AGENT, ...episode.scenes[step].cast.map(({ key }) => key)], called = (/** @type {string} */ seat) => (seat === "agent" ? AGENT : seat);
+    const chosen = this.own === episode.own ? this.who.value : called(episode.own);
+    if (names.join() !== [...this.who.options].map(({ value }) => value).join())
+      this.who.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+    this.who.value = names.includes(chosen) ? chosen : called(episode.own);
+    Object.assign(this, { seats: episode.seats, own: episode.own });
+    episode.viewer = this.member ? episode.own : this.who.value === AGENT ? "agent" : this.who.value;
   }
 
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
-    const scene = episode.scenes[step], { member } = this, names = [AGENT, ...scene.cast.map(({ key }) => key)];
-    if (names.join() !== [...this.who.options].map(({ value }) => value).join())
-      this.who.replaceChildren(...names.map((name) => make("option", { value: name, selected: name === member }, name)));
+    const scene = episode.scenes[step];
     if (!this.member) {
       this.looked = null;
-      drawPicture(this.canvas, scene.view, { tile: 32 });
-      this.canvas.setAttribute("aria-label", "the agent's own view, 7 by 7 cells; the agent looks up");
+      this.canvas.hidden = false;
+      drawPicture(this.canvas, episode.part(scene, episode.viewer).view, { tile: 32 });
+      this.canvas.setAttribute("aria-label", `${this.who.value}'s own view, 7 by 7 cells; who sees it looks up`);
       this.words.textContent = "";
       return;
     }

@@ -773,9 +773,10 @@ class Studio {
     this.seated.disabled = !own;
     const seated = own && this.seated.checked;
     this.root.classList.toggle("seated", seated);
-    this.count.textContent = `step ${length}${seated ? "" : ` · reward ${episode.scenes[length].reward.toFixed(3)}`}`;
+    this.count.textContent = `step ${length}${seated ? "" : ` · reward ${episode.part(episode.scenes[length]).reward.toFixed(3)}`}`;
     if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${seated ? (ended.success ? "success" : "no success") : outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
+    this.views.choose(episode, length);
     if (!this.views.member) this.stage.seen = undefined;
     for (const part of this.parts) part.show(episode, length);
     this.gaze();

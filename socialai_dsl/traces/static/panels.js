@@ -3,7 +3,7 @@
 import { make, makeSvg, panel, spoken } from "./dom.js";
 import { COLOURS, NPC, PALETTE, css, drawTile } from "./tiles.js";
 import { drawPicture, fittingTile } from "./room.js";
-import { slotsOf } from "./trace.js";
+import { inView, slotsOf } from "./trace.js";
 
 /** @typedef {import("./trace.js").Episode} Episode */
 /** @typedef {import("./trace.js").Scene} Scene */
@@ -25,26 +25,23 @@ export class Stage {
   show(episode, step) {
     const scene = episode.scenes[step];
     const tile = fittingTile(scene.room, this.root.clientWidth, Math.max(240, this.root.clientHeight), 96);
-    drawPicture(this.canvas, { ...scene.room, seen: this.seen }, { tile, letters: this.letters });
+    drawPicture(this.canvas, { ...scene.room, seen: this.seen ?? inSight(episode, scene) }, { tile, letters: this.letters });
     const scale = globalThis.devicePixelRatio || 1;
     this.canvas.style.width = `${this.canvas.width / scale}px`;
     this.canvas.style.height = `${this.canvas.height / scale}px`;
     this.canvas.setAttribute("aria-label", roomInWords(scene));
     this.bubbles.replaceChildren(...this.speech(episode, scene));
     spread(/** @type {HTMLElement[]} */ ([...this.bubbles.children]));
-    this.told.textContent = momentInWords(scene);
+    this.told.textContent = momentInWords(episode, scene);
   }
 
   /** @param {Episode} episode @param {Scene} scene */
   speech(episode, scene) {
     const { moment, room } = scene;
-    const said = (moment.heard ?? []).map((line) => ({ place: line.who ? episode.place(scene, line.who) : null, line }));
-    const own = moment.said
-      ? [{ place: /** @type {[number, number]} */ ([moment.agent[0], moment.agent[1]]), line: { text: moment.said, name: "", who: "agent" } }]
-      : [];
-    return [...own, ...said].map(({ place, line }) => {
+    return episode.said(scene).map((line) => {
+      const place = line.who === "agent" && moment.agent[0] >= 0 ? /** @type {[number, number]} */ ([moment.agent[0], moment.agent[1]]) : line.who ? episode.place(scene, line.who) : null;
       const text = place || !line.name ? line.text : `${line.name}: ${line.text}`;
-      const bubble = make("p", { class: line.who === "agent" ? "bubble own" : "bubble" }, text);
+      const bubble = make("p", { class: line.who === episode.own ? "bubble own" : "bubble" }, text);
       const [x, y] = place ?? [room.width / 2 - 0.5, 0];
       const across = (x + 0.5) / room.width, below = y < 1.5;
       bubble.classList.add(across < 0.35 ? "leaning-right" : across > 0.65 ? "leaning-left" : "upright");
@@ -72,6 +69,15 @@ function spread(bubbles) {
   }
 }
 
+/** The cells in sight of the seat whose view is shown; undefined for the agent, whose sight is marked without.
+ * @param {Episode} episode @param {Scene} scene @returns {Set<number> | undefined} */
+function inSight(episode, scene) {
+  const pose = episode.pose(scene, episode.viewer), { width, height } = scene.room;
+  if (pose && episode.viewer === "agent") return undefined;
+  const cells = Array.from({ length: width * height }, (_, cell) => cell);
+  return new Set(pose ? cells.filter((cell) => inView(pose, cell % width, Math.floor(cell / width))) : []);
+}
+
 /** Everything in the room, for those who do not see it. @param {Scene} scene */
 function roomInWords(scene) {
   const things = Object.keys(scene.state).filter((address) => address.endsWith(".at") && scene.state[address]);
@@ -83,13 +89,14 @@ function roomInWords(scene) {
   return `Room of ${scene.room.width} by ${scene.room.height} cells. ${told.join("; ")}.`;
 }
 
-/** What happened in a step. @param {Scene} scene */
-function momentInWords({ moment }) {
+/** What happened in a step. @param {Episode} episode @param {Scene} scene */
+function momentInWords(episode, scene) {
+  const { moment, parts } = scene;
   if (!moment.t) return "Before the first step.";
-  const heard = (moment.heard ?? []).map((line) => `${line.name ? `${line.name}: ` : ""}${line.text}`);
+  const did = parts.map((part, k) => `${episode.seats.length > 1 ? `${episode.called(episode.seats[k])} ` : ""}${part.did ?? "no action"}${part.said ? `, said “${part.said}”` : ""}`);
+  const heard = episode.said(scene).filter(({ who }) => !episode.seats.includes(who ?? "")).map((line) => `${line.name ? `${line.name}: ` : ""}${line.text}`);
   const ended = moment.ended ? [`The episode ended: ${outcomeInWords(moment.ended)}.`] : [];
-  const said = moment.said ? `, said “${moment.said}”` : "";
-  return [`Step ${moment.t}: ${moment.did ?? "no action"}${said}.`, ...heard, ...ended].join(" ");
+  return [`Step ${moment.t}: ${did.join("; ")}.`, ...heard, ...ended].join(" ");
 }
 
 /** How an episode ended; what the file says there often begins with the word. @param {import("./trace.js").Outcome} outcome */
@@ -98,16 +105,54 @@ export function outcomeInWords({ success, text }) {
   return text.startsWith(word) ? text : `${word}: ${text}`;
 }
 
-/** What the agent itself sees. */
+/** What is seen from a seat, the player's if no other is chosen. */
 export class Sight {
-  constructor() {
-    this.canvas = make("canvas", { role: "img", "aria-label": "the agent's own view, 7 by 7 cells; the agent looks up" });
-    this.root = panel("The agent's own view", "sight", this.canvas);
+  /** @param {() => void} [changed] told when another seat is chosen */
+  constructor(changed = () => {}) {
+    this.who = make("select", { "aria-label": "whose view", title: "whose view this is, and is marked in the room", onchange: changed });
+    this.canvas = make("canvas", { role: "img" });
+    this.root = panel("", "sight", this.who, this.canvas);
+  }
+
+  /** Let an episode be seen from the chosen seat. @param {Episode} episode */
+  choose(episode) {
+    const { seats } = episode;
+    if (seats.join() !== [...this.who.options].map(({ value }) => value).join())
+      this.who.replaceChildren(...seats.map((seat) => make("option", { value: seat, selected: seat === episode.viewer }, seat)));
+    this.who.hidden = seats.length === 1;
+    episode.viewer = this.who.value;
   }
 
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
-    drawPicture(this.canvas, episode.scenes[step].view, { tile: 32 });
+    const whose = episode.seats.length > 1 ? episode.called(episode.viewer) : "the agent";
+    /** @type {HTMLElement} */ (this.root.firstElementChild).textContent = `${whose[0].toUpperCase()}${whose.slice(1)}'s own view`;
+    this.canvas.setAttribute("aria-label", `${whose}'s own view, 7 by 7 cells; who sees it looks up`);
+    drawPicture(this.canvas, episode.part(episode.scenes[step], episode.viewer).view, { tile: 32 });
+  }
+}
+
+/** Who has which seat, and what was done and earned there; nothing where the agent plays alone. */
+export class Seats {
+  constructor() {
+    this.rows = make("tbody");
+    const heads = ["seat", "played by", "does", "says", "reward", ""].map((head) => make("th", { scope: "col" }, head));
+    this.root = panel("The seats", "seats", make("table", {}, make("thead", {}, make("tr", {}, ...heads)), this.rows));
+  }
+
+  /** @param {Episode} episode @param {number} step */
+  show(episode, step) {
+    const { seats, trace } = episode, scene = episode.scenes[step];
+    this.root.hidden = seats.length === 1;
+    if (this.root.hidden) return;
+    this.rows.replaceChildren(...seats.map((seat, k) => {
+      const { did, said, reward, success } = scene.parts[k], name = episode.called(seat);
+      const by = seat === episode.own ? trace.agent : (trace.players?.[seat] ?? "script");
+      return make("tr", {},
+        make("th", { scope: "row" }, seat, name === seat ? null : make("small", {}, ` “${name}”`)),
+        make("td", {}, by), make("td", {}, did ?? "–"), make("td", {}, said ?? ""), make("td", {}, reward.toFixed(3)),
+        make("td", { class: success === null ? null : `verdict ${success ? "good" : "bad"}` }, success === null ? "" : success ? "✓ success" : "✗ no success"));
+    }));
   }
 }
 
@@ -123,9 +168,9 @@ export class Transcript {
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
     const lines = episode.transcript(step).map((line) =>
-      make("li", { class: line.t === step ? "now" : null },
+      make("li", { class: [line.t === step ? "now" : "", line.reached ? "" : "unheard"].join(" ").trim() || null, title: line.reached ? null : `${episode.called(episode.viewer)} did not hear this` },
         make("button", { class: "step", title: `go to step ${line.t}`, onclick: () => this.go(line.t) }, String(line.t)),
-        make("span", {}, make("b", { class: line.who === "agent" ? "own" : "heard" }, line.name ? `${line.name}: ` : ""), line.text)));
+        make("span", {}, make("b", { class: line.who === episode.own ? "own" : "heard" }, line.name ? `${line.name}: ` : ""), line.text)));
     this.list.replaceChildren(...(lines.length ? lines : [make("li", { class: "quiet" }, "Nothing was said yet.")]));
     this.list.scrollTop = this.list.scrollHeight;
   }
@@ -239,7 +284,7 @@ export class Mind {
     this.root.hidden = !known;
     if (!known) return;
     this.chart.replaceChildren(this.draw(episode, step));
-    const { thought, action } = episode.scenes[step].moment;
+    const { thought } = episode.scenes[step].moment, { action } = episode.part(episode.scenes[step]);
     if (!thought) {
       this.value.textContent = "Before the first step.";
       this.bars.replaceChildren();

@@ -1,7 +1,7 @@
 // @ts-check
 /** A page on which recorded episodes are played: forwards, backwards, step by step. */
 import { make } from "./dom.js";
-import { Cast, Mind, Replies, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
+import { Cast, Mind, Replies, Rules, Seats, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { Episode } from "./trace.js";
 
 /** @typedef {import("./trace.js").Trace} Trace */
@@ -26,7 +26,8 @@ class Replay {
     /** @type {ReturnType<typeof setInterval> | undefined} */ this.timer = undefined;
     const go = (/** @type {number} */ step) => this.go(this.number, step);
     this.stage = new Stage();
-    this.panels = [this.stage, new Sight(), new Transcript(go), new Cast(), new Mind(go), new Replies(), new Rules()];
+    this.sight = new Sight(() => this.show());
+    this.panels = [this.stage, this.sight, new Transcript(go), new Cast(), new Seats(), new Mind(go), new Replies(), new Rules()];
     this.head = make("header");
     this.list = make("ol", { class: "episodes" });
     this.playing = make("button", { class: "main", onclick: () => this.toggle() });
@@ -51,11 +52,11 @@ class Replay {
       button("last step", "▸|", () => Infinity),
       this.scrubber, this.count, this.speeds);
     const keys = KEYS.flatMap(([key, meaning]) => [make("dt", {}, key), make("dd", {}, meaning)]);
-    const [stage, sight, transcript, cast, mind, replies, why] = this.panels.map((one) => one.root);
+    const [stage, sight, transcript, cast, seats, mind, replies, why] = this.panels.map((one) => one.root);
     return make("div", { class: "replay" }, this.head,
       make("nav", { "aria-label": "episodes", class: "panel" }, make("h2", {}, "Episodes"), this.list,
         make("details", {}, make("summary", {}, "Keys and colours"), make("dl", { class: "keys" }, ...keys), legend())),
-      make("main", {}, stage, controls, mind, replies, why),
+      make("main", {}, stage, controls, seats, mind, replies, why),
       make("aside", {}, sight, transcript, cast));
   }
 
@@ -131,16 +132,17 @@ class Replay {
   show() {
     const { episode, step } = this, { trace } = episode;
     const member = episode.scenes[step].member;
+    this.sight.choose(episode);
     this.head.replaceChildren(
       make("h1", {}, trace.scenario, member ? make("small", {}, ` ${member}`) : null),
-      make("p", {}, `${trace.agent}, ${trace.episode}. `, trace.about ?? ""), verdict(episode));
+      make("p", {}, `${trace.agent}${episode.seats.length > 1 ? ` as ${episode.called(episode.own)}` : ""}, ${trace.episode}. `, trace.about ?? ""), verdict(episode));
     this.list.replaceChildren(...this.episodes.map((one, k) => make("li", {},
       make("button", { "aria-current": k === this.number ? "true" : null, onclick: () => this.go(k, 0) },
         verdict(one), make("span", {}, `${one.trace.episode}, ${one.length} ${one.length === 1 ? "step" : "steps"}`)))));
     this.playing.textContent = this.timer === undefined ? "▶ play" : "⏸ pause";
     this.scrubber.max = String(episode.length);
     this.scrubber.value = String(step);
-    this.count.textContent = `step ${step} of ${episode.length} · reward ${episode.scenes[step].reward.toFixed(3)}`;
+    this.count.textContent = `step ${step} of ${episode.length} · reward ${episode.part(episode.scenes[step]).reward.toFixed(3)}`;
     this.speeds.value = String(this.speed);
     for (const one of this.panels) one.show(episode, step);
   }

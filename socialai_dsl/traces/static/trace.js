@@ -11,6 +11,20 @@
 /** @typedef {{probabilities: number[][], value?: number | null}} Thought */
 /** @typedef {[number, number, string, ...number[]]} TracedGesture */
 /**
+ * A moment for a seat behind the agent's.
+ * @typedef {object} SeatPart
+ * @property {number[] | null} [action]
+ * @property {string | null} [did]
+ * @property {string | null} [said]
+ * @property {Line[]} [heard]
+ * @property {number} [reward]
+ * @property {boolean | null} [success]
+ * @property {number[] | null} [view]
+ * @property {TracedGesture[]} [view_gestures]
+ * @property {[number, number][]} [view_held]
+ * @property {[number, number][]} [view_marks]
+ */
+/**
  * @typedef {object} Moment
  * @property {number} t
  * @property {string | null} [member]
@@ -32,6 +46,7 @@
  * @property {string | null} [said]
  * @property {Line[]} [heard]
  * @property {number} [reward]
+ * @property {SeatPart[]} [seats]
  * @property {number[]} [fired]
  * @property {[number, number][]} [others]
  * @property {Thought | null} [thought]
@@ -44,6 +59,10 @@
  * @property {string} scenario
  * @property {string} [about]
  * @property {string} agent
+ * @property {string[]} [seats]
+ * @property {string[]} [names]
+ * @property {string} [own]
+ * @property {Record<string, string>} [players]
  * @property {string} episode
  * @property {string[]} actions
  * @property {string[]} templates
@@ -56,6 +75,8 @@
  * @property {Moment[]} [moments]
  */
 
+/** Something that was said: by whom, and whether it reached the seat whose view is shown.
+ * @typedef {{t: number, who: string | null, name: string, text: string, reached: boolean}} Spoken */
 /**
  * Cells as they are drawn.
  * @typedef {object} Picture
@@ -70,16 +91,26 @@
  * @property {Set<number>} [seen] the cells that are marked in its place
  */
 /**
+ * What was done on a seat in a step, and what is seen, heard and earned there.
+ * @typedef {object} Part
+ * @property {number[] | null} action
+ * @property {string | null} did
+ * @property {string | null} said
+ * @property {Line[]} heard
+ * @property {number} reward sum of the rewards so far
+ * @property {boolean | null} success null until the episode has ended
+ * @property {Picture} view
+ */
+/**
  * A moment with everything that is so in it.
  * @typedef {object} Scene
  * @property {Moment} moment
  * @property {string | null} member
  * @property {Member[]} cast
  * @property {Picture} room
- * @property {Picture} view
+ * @property {Part[]} parts of the seats of the episode, in their order
  * @property {Record<string, any>} state values by address
  * @property {Record<string, any>} changed those that differ from the moment before
- * @property {number} reward sum of the rewards so far
  */
 
 const VIEW = 7;
@@ -98,7 +129,31 @@ export class Episode {
     /** @type {string[]} */ this.texts = [];
     /** @type {Rule[]} */ this.rules = [];
     /** @type {Scene[]} */ this.scenes = [];
+    /** The members of the cast with a seat, the agent first. */
+    this.seats = trace.seats?.length ? trace.seats : ["agent"];
+    /** The seat of the player. */
+    this.own = trace.own ?? "agent";
+    /** The seat whose view is shown. */
+    this.viewer = this.own;
     this.add(trace);
+  }
+
+  /** What belongs to a seat in a scene, by default to the player's. @param {Scene} scene @param {string} [seat] */
+  part(scene, seat = this.own) {
+    return scene.parts[this.seats.indexOf(seat)];
+  }
+
+  /** How a seat is called. @param {string} seat */
+  called(seat) {
+    return this.seats.length > 1 ? (this.trace.names?.[this.seats.indexOf(seat)] || seat) : "Agent";
+  }
+
+  /** Where a seat stands and looks, as x, y, direction; null if it has left. @param {Scene} scene @param {string} seat
+   * @returns {[number, number, number] | null} */
+  pose(scene, seat) {
+    if (seat === "agent") return scene.moment.agent[0] < 0 ? null : scene.moment.agent;
+    const at = this.place(scene, seat);
+    return at && [at[0], at[1], ["right", "down", "left", "up"].indexOf(scene.state[`${seat}.facing`])];
   }
 
   /** Number of steps. */
@@ -106,9 +161,10 @@ export class Episode {
     return this.scenes.length - 1;
   }
 
-  /** How the episode ended; null while it has not. @returns {Outcome | null} */
+  /** How the episode ended for the player; null while it has not. @returns {Outcome | null} */
   get ended() {
-    return this.scenes[this.length].moment.ended ?? null;
+    const scene = this.scenes[this.length], { ended } = scene.moment;
+    return ended ? { ...ended, success: this.part(scene).success ?? false } : null;
   }
 
   /** Go on with what a trace adds. @param {Trace} more */
@@ -151,20 +207,27 @@ export class Episode {
         marks: marks(moment.marks ?? []),
         tinted: true,
       },
-      view: {
-        width: VIEW,
-        height: VIEW,
-        cells: moment.view ? moment.view.map((look) => this.looks[look]) : before.view.cells,
-        agent: [(VIEW - 1) / 2, VIEW - 1, UP],
-        below: new Map(),
-        gestures: pairs(moment.view_gestures ?? []),
-        held: looks(moment.view_held ?? []),
-        marks: marks(moment.view_marks ?? []),
-        tinted: false,
-      },
+      parts: [moment, ...(moment.seats ?? [])].map((part, k) => ({
+        action: part.action ?? null,
+        did: part.did ?? null,
+        said: part.said ?? null,
+        heard: part.heard ?? [],
+        reward: (before?.parts[k].reward ?? 0) + (part.reward ?? 0),
+        success: "success" in part ? (part.success ?? null) : k === 0 ? (moment.ended?.success ?? null) : null,
+        view: {
+          width: VIEW,
+          height: VIEW,
+          cells: part.view ? part.view.map((look) => this.looks[look]) : before.parts[k].view.cells,
+          agent: [(VIEW - 1) / 2, VIEW - 1, UP],
+          below: new Map(),
+          gestures: pairs(part.view_gestures ?? []),
+          held: looks(part.view_held ?? []),
+          marks: marks(part.view_marks ?? []),
+          tinted: false,
+        },
+      })),
       state: moment.room ? changed : { ...before.state, ...changed },
       changed: before ? changed : {},
-      reward: (before?.reward ?? 0) + (moment.reward ?? 0),
     };
   }
 
@@ -175,12 +238,25 @@ export class Episode {
     return at;
   }
 
-  /** What the agent heard and said up to a step. @param {number} step */
+  /** What was said in a moment: by those on the seats, then by others as far as a seat heard it.
+   * @param {Scene} scene @returns {Spoken[]} */
+  said(scene) {
+    const { seats } = this, { moment, parts } = scene;
+    const heard = parts.map((part) => part.heard.map((line) => JSON.stringify([line.who ?? null, line.name ?? "", line.text])));
+    const own = parts.flatMap((part, k) => (part.said === null ? [] : [{ t: moment.t, who: seats[k], name: this.called(seats[k]), text: part.said }]));
+    const known = new Set(own.map(({ who, text }) => JSON.stringify([who, text])));
+    const others = [...new Set(heard.flat())].map((line) => JSON.parse(line)).filter(([who, , text]) => !known.has(JSON.stringify([who, text])));
+    const reaches = (/** @type {string | null} */ who, /** @type {string} */ text) => {
+      const k = seats.indexOf(this.viewer);
+      return who === this.viewer || parts[k].heard.some((line) => (line.who ?? null) === who && line.text === text);
+    };
+    return [...own, ...others.map(([who, name, text]) => ({ t: moment.t, who, name, text }))]
+      .map((line) => ({ ...line, reached: reaches(line.who, line.text) }));
+  }
+
+  /** What was said and heard up to a step. @param {number} step */
   transcript(step) {
-    return this.scenes.slice(0, step + 1).flatMap(({ moment }) => [
-      ...(moment.said ? [{ t: moment.t, who: "agent", name: "Agent", text: moment.said }] : []),
-      ...(moment.heard ?? []).map((line) => ({ t: moment.t, who: line.who ?? null, name: line.name ?? "", text: line.text })),
-    ]);
+    return this.scenes.slice(0, step + 1).flatMap((scene) => this.said(scene));
   }
 
   /** How often each rule has fired up to a step. @param {number} step @returns {Map<number, number>} */

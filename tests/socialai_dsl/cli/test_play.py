@@ -1,6 +1,7 @@
 """Playing from the keyboard, on a screen of 80x24: in this process, and through a real terminal of another."""
 
 import asyncio
+import contextlib
 import json
 import os
 import re
@@ -24,7 +25,9 @@ import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.view import ahead
-from socialai_dsl.play.game import Game, Sight
+from socialai_dsl.episodes.policies import RandomPolicy, ReplayedPolicy
+from socialai_dsl.evaluation.people import play_seed
+from socialai_dsl.play.game import Game, Sight, finished_episodes
 from socialai_dsl.play.screen import PlayApp
 
 BARE = """\
@@ -440,3 +443,112 @@ def test_names_reach_the_screen_as_text(tmp_path: Path) -> None:
         return f"{file}, seed {number}", {"seed": number}
 
     played(str(file), play, episodes=titled)
+
+
+# -- another seat -----------------------------------------------------------------------------------------------------
+
+TOGETHER = "together/help_together"
+TWO = """\
+scenario: two
+horizon: 20
+earshot: room
+grammar: {templates: [Say <noun>], nouns: [hello, goodbye]}
+actions: [left, right, forward]
+room: {width: 7, height: 6}
+cast:
+  agent: {name: Ann, place: anywhere}
+  bob: {name: Bob, place: anywhere, seat: open, frame: turns}
+frames:
+  turns: {states: {on: {do: turn(right), then: [{hears: Say hello, say: Hi.}]}}}
+outcome: [{success: t == 9, for: bob, reward: {bob: 50}}]
+"""
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> str:
+    path = tmp_path / "two.yaml"
+    path.write_text(TWO, encoding="utf-8")
+    return str(path)
+
+
+def test_another_seat_is_played_and_the_journal_is_replayed_to_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, two: str
+) -> None:
+    """With a policy that draws on the agent's seat: steps back take its draws with them."""
+    sizes = tuple(socialai_dsl.make(two).action_space.nvec.tolist())
+    seated: Any = (socialai_dsl.load(two), {"agent": RandomPolicy(sizes, 5)})
+    monkeypatch.setattr("socialai_dsl.evaluation.people.seating", lambda *_: seated)
+    monkeypatch.setattr("socialai_dsl.play._require_terminal", lambda: None)
+    heard: list[Any] = []
+
+    async def keys(app: PlayApp, pilot: Pilot[Any]) -> None:
+        assert "you are Bob" in shown(app, "#title")
+        others = []
+        for _ in range(2):
+            await pilot.press("up", "a", "d")
+            others.append([moment.others["agent"].tolist() for moment in app._game._moments[1:]])
+            await pilot.press("u", "u", "u")
+        assert others[0] == others[1], "the agent's draws are taken back as well"
+        await pilot.press("up", "a", "slash")
+        await typed(pilot, "forward Say goodbye")
+        await pilot.press("d", "d", "d", "d", "d", "d")
+        heard.extend(app._game.now.lines)
+        assert "success: " in shown(app, "#message")
+        assert "reward 0.2" in shown(app, "#message"), "its own: half of what the agent would be paid"
+        await pilot.press("q")
+
+    def run(app: PlayApp) -> Any:
+        async def playing() -> None:
+            async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+                await keys(app, pilot)
+
+        asyncio.run(playing())
+        return app.return_value
+
+    monkeypatch.setattr(PlayApp, "run", run)
+    ((one,), folder) = play_seed(two, 3, tmp_path / "kept", seats=[("agent", "random")])
+    assert {line.speaker for line in heard} == {"You", "Ann"}
+
+    (read,) = finished_episodes(folder / "played.jsonl")
+    assert str(read) == str(one)
+    first, *_, last = events(folder)
+    assert (first["seat"], first["seats"]) == ("bob", {"agent": "random"})
+    env = socialai_dsl.make(two, seats={"agent": ReplayedPolicy(read.others["agent"])})
+    _, info = env.reset(seed=3)
+    said = []
+    for action in read.actions:
+        *_, info = env.step(action)
+        said += [] if info["utterance"] == "NA" else info["utterance"].split("\n")
+    assert said == [f"Ann: {line.text}" for line in heard if line.speaker == "Ann"]
+    ended = info["outcome"], info["success"], len(read.actions)
+    assert ended == (last["outcome"], last["success"], last["steps"]) == ("success@12", True, 9)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--seat", "jil=random"], "expected one of agent, jill; did you mean 'jill'"),
+        (["--seat", "jill=random", "--seat", "jill=script"], "got two players for jill, expected one"),
+        (["--seat", "jill=random", "--seat", "agent=random"], "expected one seat left"),
+        (["--seat", "jill"], "expected NAME=PLAYER"),
+        (["--seat", "jill=runs/nowhere"], "runs/nowhere"),
+    ],
+)
+def test_mistakes_about_seats_are_one_sentence(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with contextlib.suppress(SystemExit):
+        assert main(["play", TOGETHER, *words]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert "Traceback" not in told
+
+
+def test_a_seat_without_a_script_has_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bare.yaml"
+    bare = f"scenario: bare\n{BARE}".replace("{agent: {}}", "{agent: {}, bob: {seat: open, name: Bob}}")
+    path.write_text(bare, encoding="utf-8")
+    assert main(["play", str(path), "--seat", "bob=script"]) == 2
+    assert "got 'script' for bob, which follows no frame" in capsys.readouterr().err
+    assert main(["play", str(path), "--seat", "agent=script"]) == 2
+    assert "the agent of bare has no frame, and there is no variant `oracle`" in capsys.readouterr().err
