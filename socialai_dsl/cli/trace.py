@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from socialai_dsl.cli.arguments import (
     add_scenario,
+    add_seats,
     episode,
     known_room,
     natural,
@@ -61,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LINE",
         help="the agent's next action, typed as in `socialai play` (repeatable, once for each step)",
     )
+    add_seats(parser)
     parser.add_argument("--steps", type=positive, metavar="N", help="show at most N steps")
     parser.add_argument(
         "--from", type=positive, default=1, metavar="K", dest="first", help="start with step K"
@@ -99,7 +101,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         refuse(arguments, ("force",), "it is for --save-test")
     taken = TakenDialogue()
     watching = [] if arguments.save_test is None else [taken]
-    played = TracedEpisode(arguments.scenario, arguments.agent, arguments.do, drawn)
+    played = TracedEpisode(arguments.scenario, arguments.agent, arguments.do, drawn, arguments.seat)
     try:
         played.require_names(arguments.why)
         last = None if arguments.steps is None else arguments.first + arguments.steps - 1

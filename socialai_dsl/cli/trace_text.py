@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.episodes.play import Observer, Rooms, Step
+from socialai_dsl.envs.seats import SeatMoment
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, Step
 from socialai_dsl.episodes.traces import TracedEpisode
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.traces.state import cast_of, changes, found, present
+from socialai_dsl.traces.steps import describe_step
 from socialai_dsl.vocabulary import spelt
 
 _WIDTH: Final = 100
@@ -60,46 +62,57 @@ class Text(Steps):
         self._played, self._names, self._color, self._first = played, names, color, first
         self._told: dict[tuple[str, str], str] = {}
         self._state: dict[str, Any] = {}
-        self._reward = 0.0
-        self._end = ""
+        self._rewards: dict[Seat, float] = {}
+        self._ends: dict[Seat, str] = {}
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """Print the scenario, and the room before the first step."""
         env, self._state = rooms.env, rooms.env.describe()
         member = f": {rooms.info['member']}" if "member" in rooms.info else ""
         played = self._played
-        title = printable(f"{played.scenario}, {played.origin()}, agent {played.agent}{member}")
+        sitting = "".join(f", {seat} {player}" for seat, player in played.players.items())
+        title = printable(
+            f"{played.scenario}, {played.origin()}, {rooms.own} {played.agent}{sitting}{member}"
+        )
         seen = _beside(env.plain_text(), present(cast_of(env.playing), self._state))
         print("\n".join([self._paint(title, _BOLD), "", *seen, ""]), flush=True)
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """Print a step."""
         super().stepped(rooms, step)
-        self._reward += float(step.reward[0])
-        if step.ended[0]:
-            verdict = "success" if step.success[0] else "no success"
-            self._end = f"{verdict} ({printable(outcome_name(step.info))})"
+        self._moments = _moments(rooms, step)
+        for seat, moment in self._moments.items():
+            self._rewards[seat] = self._rewards.get(seat, 0.0) + moment.reward
+            if step.ended[0]:
+                verdict = "success" if moment.success else "no success"
+                self._ends[seat] = f"{verdict} ({printable(outcome_name(step.info))})"
         before, self._state = self._state, rooms.env.describe()
         if self.t >= self._first:
             print("\n".join(self._lines(rooms.env, step, before)), flush=True)
 
     def end(self) -> list[str]:
-        """How it ended, or that it has not."""
-        return [f"{self._end or 'not ended'} after {self.t} steps, reward {self._reward:.3f}"]
+        """How it ended for each seat, or that it has not."""
+        several = len(self._rewards) > 1
+        return [
+            f"{f'{seat:<7} ' if several else ''}{self._ends.get(seat, 'not ended')} after {self.t} steps, "
+            f"reward {reward:.3f}"
+            for seat, reward in (self._rewards or {AGENT: 0.0}).items()
+        ]
 
     def _lines(self, env: Any, step: Step, before: dict[str, Any]) -> list[str]:
         explained, after = env.explain(), self._state
-        done = after.get("last", {"action": "none", "said": None})  # gone where another act has begun
-        said = f', says "{done["said"]}"' if done["said"] is not None else ""
-        heard = () if step.info["utterance"] == "NA" else step.info["utterance"].splitlines()
-        facts = [f"agent   {done['action']}{said}", *(f"heard   {line}" for line in heard)]
+        facts = [line for seat, moment in self._moments.items() for line in _done(env, seat, moment)]
         facts += [
             f"changed {address}: {spelt(old)} -> {spelt(new)}"
             for address, (old, new) in changes(before, after).items()
             if address.rpartition(".")[2] not in _QUIET
         ]
-        if step.reward[0]:
-            facts.append(f"reward  {step.reward[0]:.3f}")
+        several = len(self._moments) > 1
+        facts += [
+            f"reward  {f'{seat} ' if several else ''}{moment.reward:.3f}"
+            for seat, moment in self._moments.items()
+            if moment.reward
+        ]
         facts += ["", *present(cast_of(env.playing), after)]
         title = f"-- step {self.t} "
         lines = [
@@ -152,6 +165,28 @@ class Text(Steps):
 
     def _paint(self, text: str, style: str) -> str:
         return f"{style}{text}{_RESET}" if self._color and style else text
+
+
+def _moments(rooms: Rooms, step: Step) -> dict[Seat, SeatMoment]:
+    """What each seat did and got in a step."""
+    env = rooms.env
+    if len(env.seats) > 1:
+        return {seat: env.seat_moment(seat) for seat in env.seats}
+    done = env.describe().get("last", {"action": "none"})  # gone where another act has begun
+    action, success = step.actions[rooms.own][0], bool(step.success[0])
+    return {
+        rooms.own: SeatMoment({}, dict(step.info), action, done["action"], float(step.reward[0]), success)
+    }
+
+
+def _done(env: Any, seat: Seat, moment: SeatMoment) -> Iterator[str]:
+    """What a seat did, said and heard."""
+    nothing = np.zeros(len(env.action_space.nvec), np.int64)
+    action = nothing if moment.action is None else moment.action
+    words = describe_step(env.program, action, 0, moment.info["utterance"])
+    said = "" if words.said is None else f', says "{words.said}"'
+    yield f"{seat:<7} {moment.did}{said}"
+    yield from (f"heard   {line}" for line in words.heard)
 
 
 def _is_among(who: str, names: Sequence[str]) -> bool:

@@ -20,6 +20,7 @@ from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedP
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.program_suite import Playable, has_script, seats_of
+from socialai_dsl.traces.endings import short_name
 
 Partners = Mapping[Seat, Player]
 """Who plays on seats that the one in question does not play."""
@@ -188,6 +189,32 @@ class AgentsScript:
         """What its frame would do now."""
         found: Int64 = self._envs.scripted_actions(AGENT)
         return found
+
+
+def acts_of_others(env: Any) -> dict[Seat, Int64]:
+    """What those have done in the last step who sit on other seats than the caller's, int64 (heads,) each.
+
+    Args:
+        env: what `make` returns.
+    """
+    done = {seat: env.seat_moment(seat).action for seat in env.seats if seat not in env.seat_names}
+    return {seat: action for seat, action in done.items() if action is not None}
+
+
+def by_seat(acts: Sequence[Mapping[Seat, Any]]) -> dict[Seat, list[Int64]]:
+    """What was done on each seat in an episode, int64 (heads,) each, from what was done in each step."""
+    return {seat: [np.array(step[seat], np.int64) for step in acts] for seat in (acts or [{}])[0]}
+
+
+def sitting(program: Playable, partners: Partners, own: Seat) -> dict[Seat, str]:
+    """Who has each seat but the own one, in a word: nobody where there is no player and no script."""
+
+    def word(seat: Seat) -> str:
+        if seat not in partners:
+            return SCRIPT if has_script(program, seat) else "nobody"
+        return SCRIPT if partners[seat].is_script else short_name(partners[seat].agent)
+
+    return {seat: word(seat) for seat in seats_of(program) if seat != own}
 
 
 def replayed_seats(

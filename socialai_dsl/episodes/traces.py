@@ -7,22 +7,28 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, repeat
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import about_of
+from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import suggested
-from socialai_dsl.envs.factory import make
+from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import reset_arguments
-from socialai_dsl.episodes.play import Observer, OneEpisode, Rooms, Step, play
+from socialai_dsl.envs.seats import SCRIPT
+from socialai_dsl.episodes.partners import acts_of_others, by_seat, own_seat, partners_of, seating, sitting
+from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Seat, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.results import Actions
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
+from socialai_dsl.program_suite import has_script, seats_of
 from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.traces.document import Outcome, Thought, Trace
 from socialai_dsl.traces.endings import endings_of
@@ -106,13 +112,14 @@ def trace_of(
     think: Think | None = None,
     replies: Sequence[Answers] = (),
     cut_short: Outcome | None = None,
+    players: Mapping[Seat, str] = MappingProxyType({}),
 ) -> Trace:
     """Play an episode with given actions, and trace it.
 
     Episodes replay exactly, so a seed or a test episode and the actions are a complete record of one.
 
     Args:
-        env: of the scenario, as `socialai_dsl.make` returns it.
+        env: of the scenario, as `socialai_dsl.make` returns it; made with `seats` all of them are traced.
         actions: int64 (heads,) each; those after the end of the episode are ignored.
         reset: arguments of `env.reset`, such as `{"seed": 7}`.
         scenario: its name, for people.
@@ -125,11 +132,12 @@ def trace_of(
         replies: of a language model, for each action the pairs of reply and error before it, and perhaps one more entry
             after the last action.
         cut_short: the outcome of an episode that no step ended.
+        players: who has the other seats, for people.
 
     Raises:
         ValueError: there is no such episode, or an action is outside the space.
     """
-    tracing = Tracing(Tracer(env, scenario, agent, endings or {}, about), episode, think, replies)
+    tracing = Tracing(Tracer(env, scenario, agent, endings or {}, about, players), episode, think, replies)
     rooms = Rooms(env, [tracing])
     play(rooms, {rooms.own: ReplayedPolicy(actions)}, OneEpisode(reset))
     if cut_short is not None and rooms.running.any():
@@ -143,7 +151,11 @@ def _alone(observation: Observation) -> dict[str, NDArray[Any]]:
 
 
 def trace(
-    scenario: str, agent: Agent | None = None, do: Sequence[str] | None = None, **episode: Any
+    scenario: str,
+    agent: Agent | None = None,
+    do: Sequence[str] | None = None,
+    seats: Mapping[Seat, str] = MappingProxyType({}),
+    **episode: Any,
 ) -> Trace:
     """Play one episode, and say of every step which rules fired and why the others did not.
 
@@ -152,6 +164,7 @@ def trace(
         agent: oracle, random, shipped, a checkpoint or run folder, a `Player`, or a policy or function of your own, see
             `evaluate` (default: oracle where there is one, else random).
         do: what the agent does, step by step, as typed in `socialai play`; then no other agent plays.
+        seats: who has other seats: `script`, `random` or a trained agent; the agent has the first that is left.
         episode: which one, as for `reset_of`: `seed`, `index`, `test_episode`, `layout`.
 
     Raises:
@@ -159,7 +172,7 @@ def trace(
         UsageError: the agent cannot play this, or there is no such episode.
     """
     reset = reset_of(**episode)
-    played = TracedEpisode(scenario, agent, do, episode.get("seed") or 0)
+    played = TracedEpisode(scenario, agent, do, episode.get("seed") or 0, list(seats.items()))
     try:
         played.play(reset)
         return played.document()
@@ -192,32 +205,52 @@ class TracedEpisode:
         agent: see `trace`.
         lines: what the agent does, step by step, as typed in `socialai play`; then there is no other agent.
         seed: of an agent that chooses by chance.
+        seats: who has other seats, see `partners_of`.
 
     Attributes:
-        scenario: as it is played, with the script if that plays. agent: who plays.
+        scenario: as it is played, with the script if that plays. agent: who plays. players: who has the other seats.
 
     Raises:
         UsageError: the agent cannot play this.
     """
 
-    def __init__(self, scenario: str, agent: Agent | None, lines: Sequence[str] | None, seed: int) -> None:
+    def __init__(
+        self,
+        scenario: str,
+        agent: Agent | None,
+        lines: Sequence[str] | None,
+        seed: int,
+        seats: Sequence[tuple[Seat, str]] = (),
+    ) -> None:
         if agent is not None and lines is not None:
             raise UsageError("agent: got one, but `do` says what is done; leave one of them out")
-        self._asked = scenario
+        self._asked, self._loaded = scenario, load(scenario)
+        program = compiled(self._loaded)
+        partners = partners_of(seats, scenario, program)
+        own = own_seat(partners, program)
         if lines is not None:
             player = Player("typed")
         elif agent is not None:
             player = player_of(agent, scenario)
-        else:
+        elif own == AGENT:
             player = Player("random" if script_of(scenario) is None else "oracle")
+        else:
+            player = Player("oracle" if has_script(program, own) else "random")
+        if player.is_script and own != AGENT:  # it plays by itself, beside the one who was named for the agent
+            player, own = partners.pop(AGENT), AGENT
         if player.is_script:
             scenario = with_script(scenario).name
+        loaded, filled = seating(partners, scenario, load(scenario))
+        # Of several seats all are traced, also where scripts play by themselves.
+        self._seats = filled or ({} if len(seats_of(program)) > 1 else None)
+        self.players = sitting(program, partners, own)
         self.scenario, self.agent = scenario, player.agent
-        self._env: Any = make(scenario, render_mode="ansi").unwrapped
+        self._env: Any = ScenarioEnv(compiled(loaded), "ansi", scenarios_of(loaded), self._seats)
         drawn = agent.seed if isinstance(agent, Player) else seed
         self._policy = self._typed(lines) if lines is not None else self._made(replace(player, seed=drawn))
         self._reset: dict[str, Any] = {}
         self._actions = Actions()
+        self._others = _OfOthers()
 
     def play(
         self,
@@ -230,8 +263,8 @@ class TracedEpisode:
         Raises:
             UsageError: there is no such episode, or the layout does not fit, or the agent's actions do not.
         """
-        self._reset, self._actions = reset, Actions()
-        rooms = Rooms(self._env, [self._actions, *observers])
+        self._reset, self._actions, self._others = reset, Actions(), _OfOthers()
+        rooms = Rooms(self._env, [self._actions, self._others, *observers])
         try:
             play(rooms, {rooms.own: self._policy}, OneEpisode(reset), stop)
         except ValueError as error:
@@ -258,8 +291,13 @@ class TracedEpisode:
 
     def document(self) -> Trace:
         """What was played so far, as a trace: played again, without the script."""
-        loaded = load(self._asked)
-        env: Any = make(self._asked)
+        loaded, seats = self._loaded, self._seats
+        if seats is not None:
+            others = by_seat(self._others.played)
+            seats = {seat: ReplayedPolicy(actions) for seat, actions in others.items()}
+            # Whose script plays by itself does so again.
+            seats |= {seat: SCRIPT for seat in self.players if seat not in others}
+        env: Any = ScenarioEnv(compiled(loaded), scenarios=scenarios_of(loaded), seats=seats)
         try:
             return trace_of(
                 env,
@@ -270,6 +308,7 @@ class TracedEpisode:
                 episode=self.origin(),
                 endings={one.name: one.text for one in endings_of(loaded, env.unwrapped.program)},
                 about=about_of(loaded),
+                players=self.players,
             )
         finally:
             env.close()
@@ -298,6 +337,17 @@ class TracedEpisode:
         for warning in told:
             warnings.warn(warning, stacklevel=2)
         return policy
+
+
+class _OfOthers(Observer):
+    """Keeps what those on other seats have done in each step."""
+
+    def __init__(self) -> None:
+        self.played: list[dict[Seat, NDArray[np.int64]]] = []
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self.played.append(acts_of_others(rooms.env))
 
 
 def _origin(reset: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
-from socialai_dsl.episodes.partners import Company, Partners, company, own_seat, replayed_seats
+from socialai_dsl.episodes.partners import Company, Partners, company, own_seat, replayed_seats, sitting
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy
 from socialai_dsl.episodes.policies import Policy
@@ -83,7 +83,10 @@ class _Played:
         found = []
         for number in numbers:
             seats, own = self.replayed(number)
+            if seats is None and len(seats_of(self.program)) > 1:
+                seats = {}  # traced as well
             env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded), seats=seats)
+            playing = dict.fromkeys(seats or {}, self.player) | dict(self.partners)
             try:
                 policy = make_policy(self.player, env)[0] if thinks else None
                 found.append(
@@ -92,13 +95,14 @@ class _Played:
                         own,
                         {"options": {"test_episode": number}},
                         scenario=self.scenario,
-                        agent=self.player.agent,
+                        agent=self.partners.get(env.seat_names[0], self.player).agent,
                         episode=f"test episode {number}",
                         endings=texts,
                         about=about_of(self.loaded),
                         think=None if policy is None else _thinking(policy, number),
                         replies=replies.get(number, ()),
                         cut_short=_outcome(cut_short.get(number), texts),
+                        players=sitting(self.program, playing, env.seat_names[0]),
                     )
                 )
             finally:

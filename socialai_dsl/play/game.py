@@ -1,6 +1,6 @@
 """A person's game: the episode so far, its dialogue, and every step back to its start."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -13,6 +13,7 @@ from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.view import View
+from socialai_dsl.episodes.partners import acts_of_others, by_seat
 from socialai_dsl.episodes.play import Observer, Rooms, Step
 from socialai_dsl.episodes.stage import Stage, remembering
 from socialai_dsl.frontend import Loaded, load
@@ -115,14 +116,9 @@ def finished_episodes(file: Path) -> list[FinishedEpisode]:
             case "end":
                 ended = EpisodeEnd(event["outcome"], event["success"], event["text"])
                 actions = [np.array(step["action"], np.int64) for step in steps]
-                others = _by_seat([step.get("others", {}) for step in steps])
+                others = by_seat([step.get("others", {}) for step in steps])
                 played.append(FinishedEpisode(title, actions, event["reward"], ended, others))
     return played
-
-
-def _by_seat(others: Sequence[Mapping[str, Any]]) -> dict[str, list[NDArray[np.int64]]]:
-    """The actions of other seats by seat, from those of each step."""
-    return {seat: [np.array(step[seat], np.int64) for step in others] for seat in (others or [{}])[0]}
 
 
 class Game(Observer):
@@ -217,17 +213,12 @@ class Game(Observer):
                 self._seen(image, info, LastStep(movement, before.view)),
                 info.get("member"),
                 action,
-                self._others(),
+                acts_of_others(self._env),
                 (*before.lines, *words.dialogue),
                 before.reward + float(step.reward[0]),
                 self._ended(info) if step.ended[0] else None,
             )
         )
-
-    def _others(self) -> dict[str, NDArray[np.int64]]:
-        """What those on other seats did in the last step."""
-        found = {seat: self._env.seat_moment(seat).action for seat in self._env.seats if seat != self.own}
-        return {seat: action for seat, action in found.items() if action is not None}
 
     def back(self, rooms: Rooms) -> None:
         """See `Observer.back`."""
@@ -299,7 +290,7 @@ class Game(Observer):
             return None
         steps = self._moments[1:]
         actions = [moment.action for moment in steps if moment.action is not None]
-        others = _by_seat([moment.others for moment in steps])
+        others = by_seat([moment.others for moment in steps])
         return FinishedEpisode(self.title, actions, self.now.reward, ended, others)
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.episodes import trace_of
+from socialai_dsl.episodes import ReplayedPolicy, trace_of
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.traces import Thought, Trace, Tracer, trace_schema
 from tests.quick import one_in
@@ -164,3 +164,65 @@ def test_what_an_agent_thought_is_beside_what_it_did() -> None:
     assert trace.moments[0].thought is None
     assert trace.moments[1].thought == Thought(probabilities=[[0.25, 0.75]], value=0.5)
     assert trace.moments[2].thought == Thought(probabilities=[[1.0, 0.0]])
+
+
+# -- several seats ----------------------------------------------------------------------------------------------------
+
+TOGETHER = "together/levers_together"
+
+
+def test_a_trace_of_several_seats_has_what_each_of_them_got() -> None:
+    found = sd.trace(TOGETHER, agent="random", seats={"partner": "random"}, seed=4)
+    env = sd.make(TOGETHER, seats={"agent": "random"}).unwrapped
+    assert (found.seats, found.own, found.agent) == (list(env.seats), "agent", "random")
+    assert set(found.players) == set(env.seats) - {"agent"}
+    other = env.seats[1]
+    env = sd.make(
+        TOGETHER, seats={"agent": ReplayedPolicy([np.array(one.action) for one in found.moments[1:]])}
+    ).unwrapped
+    observation, _ = env.reset(seed=4)
+    earned, views = 0.0, None
+    for t, moment in enumerate(found.moments):
+        part = moment.seats[0]
+        views = views if part.view is None else part.view
+        assert views is not None
+        codes = env.view(observation["image"]).codes
+        assert [found.looks[number] for number in views] == [
+            tuple(code) for row in codes.tolist() for code in row
+        ]
+        if t + 1 == len(found.moments):
+            break
+        acts = found.moments[t + 1].seats[0].action
+        observation, reward, *_, info = env.step(np.array(acts))
+        earned += reward
+        heard = [f"{line.name}: {line.text}" for line in found.moments[t + 1].seats[0].heard]
+        assert "\n".join(heard) == info["utterance"].replace("NA", "")
+        assert found.moments[t + 1].seats[0].reward == pytest.approx(reward, abs=1e-6)
+    assert env.seat_names == (other,)
+    assert found.moments[-1].seats[0].success is info["success"]
+    assert Trace.model_validate_json(found.as_json()) == found
+    jsonschema.validate(json.loads(found.as_json()), trace_schema(), jsonschema.Draft202012Validator)
+
+
+def test_a_script_that_plays_by_itself_is_seen_and_heard_in_a_trace() -> None:
+    found = sd.trace(TOGETHER, seed=1)
+    assert found.succeeded
+    assert found.players == {found.seats[1]: "script"}
+    parts = [moment.seats[0] for moment in found.moments[1:]]
+    assert all(part.action is None for part in parts)
+    assert {"forward", "toggle"} <= {part.did for part in parts}
+    assert parts[-1].success
+    assert found.names[1] in {line.name for moment in found.moments for line in moment.heard}
+
+
+def test_the_player_of_another_seat_has_the_success_that_counts(tmp_path: Path) -> None:
+    path = tmp_path / "won.yaml"
+    path.write_text(
+        "scenario: won\nhorizon: 4\nroom: {size: 6}\nactions: [left]\n"
+        "grammar: {templates: [Say <noun>], nouns: [hello]}\n"
+        "cast: {agent: {}, bob: {seat: open, name: Bob}}\noutcome: [{success: t == 2, for: bob}]\n",
+        encoding="utf-8",
+    )
+    own, other = (sd.trace(str(path), "random", seats={seat: "random"}) for seat in ("agent", "bob"))
+    assert (own.own, own.succeeded, own.moments[-1].seats[0].success) == ("bob", True, True)
+    assert (other.own, other.succeeded) == ("agent", False)
