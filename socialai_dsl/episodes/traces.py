@@ -236,7 +236,9 @@ class TracedEpisode:
             player = Player("random" if script_of(scenario) is None else "oracle")
         else:
             player = Player("oracle" if has_script(program, own) else "random")
-        if player.is_script and own != AGENT:  # it plays by itself, beside the one who was named for the agent
+        if (
+            player.is_script and own != AGENT
+        ):  # it plays by itself, beside the one who was named for the agent
             player, own = partners.pop(AGENT), AGENT
         if player.is_script:
             scenario = with_script(scenario).name

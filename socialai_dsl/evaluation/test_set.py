@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
-from socialai_dsl.envs.factory import make
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
@@ -61,7 +60,8 @@ class _Played:
         seats = seats_of(self.program)
         scripts = [seat for seat in seats if seat != AGENT and self.partners.get(seat, self.player).is_script]
         own = AGENT if self.seat in scripts else self.seat
-        return replayed_seats(seats, own, scripts, self.actions[number])
+        others, actions = replayed_seats(seats, own, scripts, self.actions[number])
+        return ({} if others is None and len(seats) > 1 else others), actions
 
     def traces(
         self,
@@ -83,8 +83,6 @@ class _Played:
         found = []
         for number in numbers:
             seats, own = self.replayed(number)
-            if seats is None and len(seats_of(self.program)) > 1:
-                seats = {}  # traced as well
             env = ScenarioEnv(self.program, scenarios=scenarios_of(self.loaded), seats=seats)
             playing = dict.fromkeys(seats or {}, self.player) | dict(self.partners)
             try:
@@ -220,7 +218,7 @@ class Evaluation:
             label: how the recording calls the agent.
         """
         seats, own = self._episodes.replayed(number)
-        env = make(self.program, render_mode="rgb_array", seats=seats)
+        env = ScenarioEnv(self.program, "rgb_array", scenarios_of(self.loaded), seats)
         title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,8 @@ class Step:
 
     Attributes:
         t: counted from 1.
-        action: the primitive's name, "none" where the agent did not move.
-        said: the agent's utterance, None if it was silent.
+        action: the primitive's name, "none" where who plays did not move.
+        said: its utterance, None if it was silent.
         heard: lines `Name: text`, in the order spoken.
     """
 
@@ -44,6 +44,17 @@ def describe_step(
     said = program.sentences.text(template, spoken) if speaks else None
     heard = () if utterance == "NA" else tuple(utterance.splitlines())
     return Step(t, words[primitive], said, heard)
+
+
+def spoken(said: Mapping[str, Step]) -> list[DialogueLine]:
+    """The lines of a step of several seats: what was said there, then what somebody there heard from others, each once.
+
+    Args:
+        said: the step of each seat, by the name by which others hear it.
+    """
+    lines = [DialogueLine(step.t, name, step.said) for name, step in said.items() if step.said is not None]
+    heard = [heard_line(step.t, line) for step in said.values() for line in step.heard]
+    return list(dict.fromkeys([*lines, *heard]))
 
 
 def heard_line(t: int, line: str) -> DialogueLine:

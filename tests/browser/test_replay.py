@@ -126,3 +126,22 @@ def test_a_notebook_shows_an_episode_in_a_frame(page: Page) -> None:
     frame.get_by_role("button", name="last step").click()
     frame.locator(".controls output", has_text="step 3 of 3").wait_for()
     assert frame.locator(".transcript b.own").count() == 3
+
+
+def test_all_seats_are_shown_and_one_of_them_chosen(page: Page, tmp_path: Path) -> None:
+    file = tmp_path / "together.html"
+    assert main(["replay", "together/levers_together", "--test-episode", "0", "-o", str(file)]) == 0
+    page.goto(f"{file.as_uri()}#e1s0")
+    page.get_by_role("button", name="play").wait_for()
+    rows = page.locator(".seats tbody tr")
+    assert ["agent", "partner"] == [text.split()[0] for text in rows.all_inner_texts()]
+    canvas, room = page.locator(".sight canvas"), page.locator(".stage canvas")
+    agents = canvas.evaluate("one => one.toDataURL()"), room.evaluate("one => one.toDataURL()")
+    page.get_by_label("whose view").select_option("partner")
+    assert canvas.get_attribute("aria-label") == "Bob's own view, 7 by 7 cells; who sees it looks up"
+    assert agents[0] != canvas.evaluate("one => one.toDataURL()")
+    assert agents[1] != room.evaluate("one => one.toDataURL()"), "its sight is marked"
+    page.keyboard.press("End")
+    assert all("✓ success" in text for text in rows.all_inner_texts())
+    assert "toggle" in rows.last.inner_text()
+    assert {"Ann: ", "Bob: "} >= set(page.locator(".transcript li b").all_inner_texts())

@@ -1,5 +1,6 @@
 """Recording an episode: words for actions, the transcript, the film."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -9,6 +10,10 @@ import pytest
 from gymnasium.spaces import MultiDiscrete
 from PIL import Image
 
+import socialai_dsl as sd
+from socialai_dsl.compilation import scenarios_of
+from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.program import Program
 from socialai_dsl.render.panel import DialogueLine, Face
@@ -34,7 +39,8 @@ PROGRAM = cast(Program, Words())
 class Stand:
     """An environment of three steps that says what it was told to."""
 
-    program, action_space, seat_names = PROGRAM, MultiDiscrete([4, 2, 2, 2]), ("agent",)
+    program, action_space = PROGRAM, MultiDiscrete([4, 2, 2, 2])
+    seats = seat_names = ("agent",)
 
     def __init__(self, heard: list[str], **more: str) -> None:
         self._heard, self._more = heard, more
@@ -147,3 +153,23 @@ def test_the_film_has_a_picture_for_each_step_and_one_before(tmp_path: Path) -> 
 def test_an_episode_that_goes_otherwise_is_a_bug_of_ours() -> None:
     with pytest.raises(AssertionError, match="internal: played again, an episode goes on after 2 steps"):
         film(Stand(HEARD), ACTIONS[:2], {}, "an episode")
+
+
+def test_a_recording_of_several_seats_shows_what_each_of_them_did(tmp_path: Path) -> None:
+    scenario = "together/levers_together+oracle"
+    loaded = sd.load(scenario)
+    env = ScenarioEnv(compiled(loaded), "rgb_array", scenarios_of(loaded), {})
+    env.reset(seed=1)
+    actions, ended = [], False
+    while not ended:
+        actions.append(env.scripted_action())
+        *_, ended, _, _ = env.step(actions[-1])
+    found = film(env, actions, {"seed": 1}, "an episode")
+    text = found.transcript()
+    first, second = (line.split() for line in text.split("\n")[3:5])
+    assert (first[:2], second[0]) == (["1", "agent"], "partner")
+    assert re.search(r"^partner  success \(success@34\) after \d+ steps, reward 0\.\d+$", text, re.MULTILINE)
+    assert {"toggle"} <= {step.action for one in found.seats.values() for step in one.steps}
+    assert [one.name for one in found.seats.values()] == ["Ann", "Bob"]
+    assert all(len(one.steps) == len(found.steps) for one in found.seats.values())
+    assert len(found.frames) == len(found.steps) + 1
