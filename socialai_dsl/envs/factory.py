@@ -72,7 +72,13 @@ def make(
     _check_scenario(scenario)
     if isinstance(scenario, Playable):
         return ScenarioEnv(scenario, render_mode, seats=seats)
-    loaded = load(scenario)
+    return make_loaded(load(scenario), render_mode, seats)
+
+
+def make_loaded(
+    loaded: Loaded, render_mode: str | None = None, seats: Mapping[str, Any] | None = None
+) -> ScenarioEnv:
+    """`make` of a scenario or suite that is loaded already."""
     return ScenarioEnv(compiled(loaded), render_mode, scenarios_of(loaded), seats)
 
 

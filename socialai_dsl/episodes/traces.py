@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import about_of
-from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import suggested
-from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.envs.factory import compiled
+from socialai_dsl.envs.factory import compiled, make_loaded
 from socialai_dsl.envs.options import reset_arguments
 from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.episodes.partners import acts_of_others, by_seat, own_seat, partners_of, seating, sitting
@@ -247,7 +245,7 @@ class TracedEpisode:
         self._seats = filled or ({} if len(seats_of(program)) > 1 else None)
         self.players = sitting(program, partners, own)
         self.scenario, self.agent = scenario, player.agent
-        self._env: Any = ScenarioEnv(compiled(loaded), "ansi", scenarios_of(loaded), self._seats)
+        self._env: Any = make_loaded(loaded, "ansi", self._seats)
         drawn = agent.seed if isinstance(agent, Player) else seed
         self._policy = self._typed(lines) if lines is not None else self._made(replace(player, seed=drawn))
         self._reset: dict[str, Any] = {}
@@ -299,7 +297,7 @@ class TracedEpisode:
             seats = {seat: ReplayedPolicy(actions) for seat, actions in others.items()}
             # Whose script plays by itself does so again.
             seats |= {seat: SCRIPT for seat in self.players if seat not in others}
-        env: Any = ScenarioEnv(compiled(loaded), scenarios=scenarios_of(loaded), seats=seats)
+        env: Any = make_loaded(loaded, seats=seats)
         try:
             return trace_of(
                 env,

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.checking.briefing import Briefing, brief
-from socialai_dsl.compilation import scenarios_of
-from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.envs.factory import compiled
+from socialai_dsl.envs.factory import make_loaded
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.partners import acts_of_others, by_seat
 from socialai_dsl.episodes.play import Observer, Rooms, Step
@@ -151,7 +149,7 @@ class Game(Observer):
     ) -> None:
         loaded = load(scenario) if loaded is None else loaded
         company, partners = remembering(seats)
-        env = ScenarioEnv(compiled(loaded), scenarios=scenarios_of(loaded), seats=company)
+        env = make_loaded(loaded, seats=company)
         self._stage = Stage(env, [self], partners)
         self._env, self.own = env, self._stage.own
         self._program: Playable = self._env.program

@@ -134,7 +134,7 @@ def test_all_seats_are_shown_and_one_of_them_chosen(page: Page, tmp_path: Path) 
     page.goto(f"{file.as_uri()}#e1s0")
     page.get_by_role("button", name="play").wait_for()
     rows = page.locator(".seats tbody tr")
-    assert ["agent", "partner"] == [text.split()[0] for text in rows.all_inner_texts()]
+    assert [text.split()[0] for text in rows.all_inner_texts()] == ["agent", "partner"]
     canvas, room = page.locator(".sight canvas"), page.locator(".stage canvas")
     agents = canvas.evaluate("one => one.toDataURL()"), room.evaluate("one => one.toDataURL()")
     page.get_by_label("whose view").select_option("partner")
