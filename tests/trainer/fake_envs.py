@@ -34,6 +34,8 @@ class EchoEnvs(gym.vector.VectorEnv):
     environment whose episode is over until it is reset.
     """
 
+    seat_names = ("agent",)
+
     def __init__(
         self,
         num_envs,
