@@ -88,8 +88,8 @@ def add_seats(parser: argparse.ArgumentParser) -> None:
         type=seat_and_player,
         default=[],
         metavar="NAME=PLAYER",
-        help="who plays a member of the cast with a seat: script, random, a run, a checkpoint or shipped:NAME "
-        "(repeatable); the one who plays has the first seat that is left",
+        help="who plays a member of the cast with a seat: script, random, nobody, a run, a checkpoint or "
+        "shipped:NAME (repeatable); the one who plays has the first seat that is left",
     )
 
 

@@ -6,14 +6,14 @@ both see the same is checked at every step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
@@ -68,13 +68,15 @@ class Companion(Copied):
 
     Args:
         loaded: the scenario or suite that the environment plays.
+        own: the number of the seat whose images are given, where all seats are played; by default the agent is alone.
     """
 
-    def __init__(self, loaded: Loaded) -> None:
+    def __init__(self, loaded: Loaded, own: int | None = None) -> None:
         self._playable, self._probes = compile_asking_loaded(loaded)
-        self._table = Table([self._playable], 1)
+        self._table = Table([self._playable], 1, all_seats=own is not None)
+        self._own = own or 0
         self._lookers = [
-            Looker(program) if probes else None
+            Looker(program, own is not None) if probes else None
             for program, probes in zip(self._table.programs, self._probes, strict=True)
         ]
 
@@ -89,18 +91,23 @@ class Companion(Copied):
         self._table.reset(seed, options)
         self._compare(image)
 
-    def follow(self, action: NDArray[np.int64], image: NDArray[np.uint8]) -> None:
+    def follow(self, actions: Sequence[ArrayLike | None], image: NDArray[np.uint8]) -> None:
         """Take the environment's step.
 
         Args:
-            action: int64 (heads,).
+            actions: of each seat integers (heads,); None where nobody sits.
             image: of the environment's observation after it.
         """
-        self._table.step(Task.STEP_ONLY, action[None])
+        nothing = np.zeros(len(self._table.merged.action_space().nvec), np.int64)
+        self._table.set_taken(np.array([action is not None for action in actions]))
+        played = [nothing if action is None else np.asarray(action, np.int64) for action in actions]
+        self._table.step(Task.STEP_ONLY, np.stack(played))
         self._compare(image)
 
     def _compare(self, image: NDArray[np.uint8]) -> None:
-        assert np.array_equal(self._table.image[0], image), "internal: the programs that ask went another way"
+        assert np.array_equal(self._table.image[self._own], image), (
+            "internal: the programs that ask went another way"
+        )
 
     def values(self, begins: bool = False) -> dict[str, str | None]:
         """What is right now, for each probe; None where something that it is about is not there.
@@ -145,7 +152,7 @@ class Asker(Companion):
 
     def step(self, action: NDArray[np.int64], image: NDArray[np.uint8], ended: bool) -> list[Question]:
         """Take the environment's step (see `follow`), after which the episode may have ended; what is asked now."""
-        self.follow(action, image)
+        self.follow([action], image)
         return self._questions(ended=ended)
 
     def _questions(self, begins: bool = False, ended: bool = False) -> list[Question]:
@@ -176,11 +183,11 @@ class Asker(Companion):
 class Looker:
     """Reads what a program notes of a moment, in one step that is then forgotten."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, all_seats: bool = False) -> None:
         self._program = program
-        self._table = Table([program], 1)
-        self._table.batch.ports.actions[0] = 0
-        self._table.batch.ports.actions[0, 0] = len(program.actions)
+        self._table = Table([program], 1, all_seats)
+        self._table.batch.ports.actions[:] = 0
+        self._table.batch.ports.actions[:, 0] = len(program.actions)
         self._remembered = [name.register for name in program.registers if name.path.startswith(NOTED)]
 
     @property

@@ -205,7 +205,7 @@ class _Performance:
         if terminated or truncated:
             self._end = _End(info["outcome"], bool(info["success"]))
         if self._companion is not None:
-            self._companion.follow(action, observation["image"])
+            self._companion.follow([action], observation["image"])
         return [] if info["utterance"] == SILENCE else info["utterance"].split("\n")
 
     # -- what must be so -----------------------------------------------------------------------------------------

@@ -20,10 +20,11 @@ class Gaze(Companion):
         loaded: what the environment plays.
         checked: the scenario that has the member; of a suite that of one of its members.
         number: of the member, as `Entity.number` has it.
+        own: see `Companion`.
     """
 
-    def __init__(self, loaded: Loaded, checked: CheckedScenario, number: int) -> None:
-        super().__init__(_asking(loaded, checked, number))
+    def __init__(self, loaded: Loaded, checked: CheckedScenario, number: int, own: int | None = None) -> None:
+        super().__init__(_asking(loaded, checked, number), own)
 
     def cells(self, begins: bool = False) -> frozenset[tuple[int, int]]:
         """The cells that it sees now, x and y; none where the episode plays another scenario of the suite.

@@ -1,4 +1,4 @@
-"""Who sits on the seats of environments: the caller on one or on all, a script, chance or a policy on the others."""
+"""Who sits on the seats of environments: the caller on one or all, a script, chance, a policy or nobody on others."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from socialai_dsl.program import Flag, Header, Program, Register
 
 SCRIPT: Final = "script"
 RANDOM: Final = "random"
+NOBODY: Final = "nobody"
 
 Seating = str | Mapping[str, Any]
 """`agent`, `all`, or the seats that others than the caller fill, by member of the cast."""
@@ -60,7 +61,7 @@ class Seats:
     Attributes:
         names: all of them, the agent's first; with `agent` alone that one.
         own: the number of the caller's; None: all are.
-        partners: who fills the others, by number: SCRIPT, RANDOM or a `Partner`.
+        partners: who fills the others, by number: SCRIPT, RANDOM, NOBODY or a `Partner`.
     """
 
     names: tuple[str, ...]
@@ -112,11 +113,14 @@ def require_seat(name: Any, names: Sequence[str]) -> None:
 
 
 def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None:
-    if isinstance(partner, str) and partner not in (SCRIPT, RANDOM):
-        raise ValueError(f"seats[{name!r}]: got {partner!r}; expected 'script', 'random' or a policy")
+    if isinstance(partner, str) and partner not in (SCRIPT, RANDOM, NOBODY):
+        raise ValueError(
+            f"seats[{name!r}]: got {partner!r}; expected 'script', 'random', 'nobody' or a policy"
+        )
     if not isinstance(partner, str) and not (hasattr(partner, "act") and hasattr(partner, "reset")):
         raise ValueError(
-            f"seats[{name!r}]: got {partner!r}; expected 'script', 'random' or a policy with `reset` and `act`"
+            f"seats[{name!r}]: got {partner!r}; expected 'script', 'random', 'nobody' or a policy with "
+            "`reset` and `act`"
         )
     lacking = [p.name for p in programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
     if name == "agent" and partner == SCRIPT and lacking:
@@ -167,6 +171,8 @@ class Company:
         for number, partner in self._partners.items():
             if _is(partner, RANDOM):
                 actions[:, number] = self._drawn(number)
+            elif _is(partner, NOBODY):
+                actions[:, number, 0] = self._sizes[0] - np.uint64(1)  # no movement
             elif not isinstance(partner, str):
                 image, tokens = table.image[number::count].copy(), table.tokens[number::count].copy()
                 actions[:, number] = partner.act({"image": image, "tokens": tokens})

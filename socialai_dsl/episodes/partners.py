@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import compiled, make, make_vec
-from socialai_dsl.envs.seats import RANDOM, SCRIPT
+from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
 from socialai_dsl.episodes.play import AGENT, Seat
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.program_suite import Playable, has_script, seats_of
+from socialai_dsl.source import Source
 from socialai_dsl.traces.endings import short_name
 
 Partners = Mapping[Seat, Player]
@@ -29,7 +31,8 @@ _SEAT = "seat"
 
 
 def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, Player]:
-    """Who is meant by pairs of a seat and a player: `script`, `random`, the path of a trained agent or `shipped:NAME`.
+    """Who is meant by pairs of a seat and a player: `script`, `random`, `nobody`, the path of a trained agent or
+    `shipped:NAME`.
 
     Args:
         named: the pairs.
@@ -47,7 +50,8 @@ def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playa
             raise OptionError(_SEAT, f"got {seat!r}, expected one of {', '.join(seats)}{near}")
         if seat in found:
             raise OptionError(_SEAT, f"got two players for {seat}, expected one")
-        found[seat] = Player("oracle" if name == SCRIPT else named_agent(name, scenario))
+        words = {SCRIPT: "oracle", NOBODY: NOBODY}
+        found[seat] = Player(words[name] if name in words else named_agent(name, scenario))
     if len(found) == len(seats):
         raise OptionError(_SEAT, f"got a player for {', '.join(seats)}, expected one seat left for who plays")
     return found
@@ -59,7 +63,7 @@ def own_seat(partners: Partners, program: Playable) -> Seat:
 
 
 def seating(
-    partners: Partners, scenario: str, loaded: Loaded
+    partners: Partners, scenario: str, loaded: Loaded, texts: Mapping[Path, Source] | None = None
 ) -> tuple[Loaded, dict[Seat, str | Policy] | None]:
     """What is made for one who plays alone, and who fills the other seats there, as `make` takes it by `seats`.
 
@@ -67,6 +71,7 @@ def seating(
         partners: of other seats; the rest follow their scripts.
         scenario: as it was asked for.
         loaded: the same.
+        texts: those that it is loaded with, see `check`.
 
     Returns:
         The scenario, or its variant `oracle` where a script plays the agent; None where nobody was named.
@@ -77,7 +82,7 @@ def seating(
     if not partners:
         return loaded, None
     if AGENT in partners and partners[AGENT].is_script:
-        loaded = with_script(scenario, loaded).loaded
+        loaded = with_script(scenario, loaded, texts).loaded
     program = compiled(loaded)
     env = make(program)
     try:
@@ -93,11 +98,11 @@ def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | P
         if not has_script(program, seat):
             raise OptionError(_SEAT, f"got 'script' for {seat}, which follows no frame, so it has no script")
         return SCRIPT
-    if player.agent == RANDOM and player.policy is None:
-        return RANDOM
+    if player.agent in (RANDOM, NOBODY) and player.policy is None:
+        return player.agent
     if player.is_model or player.is_person:
         raise OptionError(
-            _SEAT, f"got {player.agent!r} for {seat}, expected script, random or a trained agent"
+            _SEAT, f"got {player.agent!r} for {seat}, expected script, random, nobody or a trained agent"
         )
     if player.is_trained:
         require_trainer()

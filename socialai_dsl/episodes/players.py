@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing, Tell, brief
 from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.envs.seats import NOBODY
 from socialai_dsl.episodes.play import Rooms
 from socialai_dsl.episodes.policies import (
     FunctionPolicy,
@@ -19,6 +20,7 @@ from socialai_dsl.episodes.policies import (
     PredictingPolicy,
     RandomPolicy,
     ScriptedPolicy,
+    StillPolicy,
 )
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
@@ -38,7 +40,7 @@ class Player:
     """Who plays, and how.
 
     Attributes:
-        agent: `random`, `oracle`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
+        agent: `random`, `oracle`, `nobody`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
             checkpoints or of one; of a policy of one's own what it is called.
         device: where a network runs.
         greedy: whether a network takes its most probable action instead of sampling.
@@ -96,12 +98,14 @@ class Player:
 
     @property
     def kind(self) -> str:
-        """What kind of mind plays: chance, script, person, model, network, or a policy in Python."""
+        """What kind of mind plays: chance, script, nobody, person, model, network, or a policy in Python."""
         if self.policy is not None:
             return "policy"
         if self.is_model:
             return "model"
-        return {"random": "chance", "oracle": "script", "human": "person"}.get(self.agent, "network")
+        return {"random": "chance", "oracle": "script", "human": "person", NOBODY: NOBODY}.get(
+            self.agent, "network"
+        )
 
     @property
     def is_script(self) -> bool:
@@ -111,7 +115,7 @@ class Player:
     @property
     def is_trained(self) -> bool:
         """Whether a network plays whose checkpoint `agent` names."""
-        return self.policy is None and self.agent not in UNTRAINED and not self.is_model
+        return self.policy is None and self.agent not in (*UNTRAINED, NOBODY) and not self.is_model
 
     def briefing(self, loaded: Loaded) -> Briefing:
         """What is told of a scenario or suite before the first observation.
@@ -160,6 +164,8 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
         )
     if player.agent == "random":
         return RandomPolicy(Rooms(envs).action_sizes, player.seed), []
+    if player.agent == NOBODY:
+        return StillPolicy(Rooms(envs).action_sizes), []
     if player.agent == "oracle":
         return ScriptedPolicy(envs), []
     from trainer.play import CheckpointPolicy

@@ -82,6 +82,24 @@ class RandomPolicy:
         return chosen
 
 
+class StillPolicy:
+    """Stays and is silent.
+
+    Args:
+        action_sizes: the number of choices of each part, `envs.single_action_space.nvec`.
+    """
+
+    def __init__(self, action_sizes: tuple[int, ...]) -> None:
+        self._nothing = np.array([action_sizes[0] - 1, *(0 for _ in action_sizes[1:])], np.int64)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        return np.tile(self._nothing, (len(observation["tokens"]), 1))
+
+
 class ScriptedPolicy:
     """The scenario's own script for the agent.
 

@@ -162,7 +162,8 @@ def trace(
         agent: oracle, random, shipped, a checkpoint or run folder, a `Player`, or a policy or function of your own, see
             `evaluate` (default: oracle where there is one, else random).
         do: what the agent does, step by step, as typed in `socialai play`; then no other agent plays.
-        seats: who has other seats: `script`, `random` or a trained agent; the agent has the first that is left.
+        seats: who has other seats: `script`, `random`, `nobody` or a trained agent; the agent has the first that is
+            left.
         episode: which one, as for `reset_of`: `seed`, `index`, `test_episode`, `layout`.
 
     Raises:

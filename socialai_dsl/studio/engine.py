@@ -15,6 +15,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from socialai_dsl.envs.seats import NOBODY
 from socialai_dsl.studio.files import PLAYERS
 from socialai_dsl.studio.messages import ANSWERS, Begin, Check, Question, Show, Test, WriteTest
 from socialai_dsl.studio.worker import answer_window
@@ -172,5 +173,8 @@ def _seconds(question: Question) -> float:
         return _TRYING_SECONDS
     if isinstance(question, Show | WriteTest):
         return _LOADING_SECONDS
-    loads = isinstance(question, Begin) and question.player not in PLAYERS
+    loads = isinstance(question, Begin) and not {question.player, *question.others.values()} <= {
+        *PLAYERS,
+        NOBODY,
+    }
     return _LOADING_SECONDS if loads else _USUAL_SECONDS

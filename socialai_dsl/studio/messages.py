@@ -75,12 +75,17 @@ class Begin(_Message):
 
     Attributes:
         player: `me`, `script`, `random`, `shipped:NAME` or the folder of a run. variant: as that of `Shown`.
+        seat: which one of several is the player's.
+        others: who has the others, by member of the cast: as `player`, or `nobody`, but not `me`; whoever is left out
+            follows the script, if there is one.
     """
 
     do: Literal["begin"]
     room: Room = Room()
     player: _Word = "me"
     variant: _Word = ""
+    seat: _Word = "agent"
+    others: dict[_Word, _Word] = {}
 
 
 class Show(_Message):
@@ -399,6 +404,7 @@ class Episode(_Part):
 
     Attributes:
         phrases: what can be said. rules: names of all rules, whether they were asked or not.
+        others: who has other seats than the player, by member of the cast.
         seats: of each moment.
     """
 
@@ -407,8 +413,20 @@ class Episode(_Part):
     rules: list[str]
     player: str
     variant: str
+    others: dict[str, str]
     room: Room
     seats: list[Seat]
+
+
+class Playable(_Part):
+    """A member of the cast that can be played.
+
+    Attributes:
+        seat: its name in the file. script: whether it has one.
+    """
+
+    seat: str
+    script: bool
 
 
 class Plays(_Part):
@@ -416,12 +434,12 @@ class Plays(_Part):
 
     Attributes:
         names: by which agents know it that were trained on it.
-        script: whether the agent has one. rivals: strategies that lack the skill.
+        rivals: strategies of the agent that lack the skill. seats: those that can be played, the agent's first.
     """
 
     names: list[str]
-    script: bool
     rivals: list[str]
+    seats: list[Playable]
 
 
 class Drawn(_Message):

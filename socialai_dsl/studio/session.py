@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -17,17 +19,21 @@ from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.factory import compiled, make_loaded
 from socialai_dsl.envs.gaze import Gaze
 from socialai_dsl.envs.options import reset_arguments
-from socialai_dsl.episodes.play import AGENT, OneEpisode, Rooms, play
+from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
+from socialai_dsl.episodes.partners import partners_of, seating, sitting
+from socialai_dsl.episodes.play import AGENT, OneEpisode, Rooms, Seat, play
 from socialai_dsl.episodes.policies import Policy, RandomPolicy, ReplayedPolicy
-from socialai_dsl.episodes.stage import Stage
+from socialai_dsl.episodes.stage import Stage, remembering
 from socialai_dsl.episodes.traces import Tracing, thought_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import Loaded, check, closest_script, load
 from socialai_dsl.library import prelude
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.loader.reader import display_name
+from socialai_dsl.program_suite import Playable, has_script, seats_of
 from socialai_dsl.semantics.typed import Phrases
 from socialai_dsl.source import Source
 from socialai_dsl.studio.judging import finding, texts_of
@@ -41,8 +47,27 @@ from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 Reply = dict[str, Any]
 
 _FIRST: Final = Room()
+_NOBODY_ELSE: Final[Mapping[Seat, str]] = MappingProxyType({})
 _ENDED: Final = "the episode has ended; take steps back, or begin another"
 _FLOOR: Final = prelude().types["floor"].code
+
+
+@dataclass(frozen=True)
+class Casting:
+    """What is played, and who plays it.
+
+    Attributes:
+        player: on the own seat: `me`, `script`, `random`, `shipped:NAME`, or the folder of a run.
+        variant: variants and parameters behind the scenario's name.
+        seat: the own one.
+        others: on other seats, by member of the cast: as `player`, or `nobody`, but not `me`; whoever is left out
+            follows the script, if there is one.
+    """
+
+    player: str = "me"
+    variant: str = ""
+    seat: Seat = AGENT
+    others: Mapping[Seat, str] = field(default_factory=dict)
 
 
 class Session:
@@ -55,14 +80,16 @@ class Session:
         self._phrases = Phrases((), Sentences((), (), ()))
         self._text_view: TextView | None = None
         self._briefing = NO_BRIEFING
-        self._player, self._variant, self._room = "me", "", Room()
+        self._casting, self._room = Casting(), Room()
         self._loaded: Loaded | None = None
         self._gaze: tuple[int, int, Gaze] | None = None
         self._policy: Policy = RandomPolicy(())
+        self._others: Mapping[Seat, str] = {}
         self._prepared = False
 
     def draw(self, path: str, text: str, room: Room = _FIRST) -> Reply:
         """Check a text that is to stand in a file, and draw its room if it is sound; of tests their scenario's."""
+        kept = self._kept() if self._file == Path(path) else Casting()
         self._file, self._texts = Path(path), texts_of(path, text)
         found = check(path, self._texts)
         own = display_name(self._file)
@@ -73,38 +100,48 @@ class Session:
         self._scenario = self._file if whole is None else whole.path
         try:
             loaded = load(str(self._scenario), self._texts)
-            self._use(loaded)
+            plays = self._plays(loaded)
+            try:
+                self._use(loaded, kept)
+            except RefusalError:  # somebody has no seat any more
+                self._use(loaded, Casting())
         except ScenarioError as error:  # it is sound, and nothing that can be played
             return {"findings": [*told, *(finding(one, own) for one in error.diagnostics)]}
-        self._player, self._variant = "me", ""
         try:
-            return {"findings": told, "plays": self._plays(loaded), **self.begin(room)}
+            return {"findings": told, "plays": plays, **self._begin(room, self._casting)}
         except RefusalError as refusal:
             return {"findings": told, "refused": str(refusal)}
 
+    def _kept(self) -> Casting:
+        """Who sits where after a change of the text: a person on the same seat, and others who need not be loaded."""
+        others = {seat: who for seat, who in self._casting.others.items() if who in (SCRIPT, RANDOM, NOBODY)}
+        return Casting(seat=self._casting.seat, others=others)
+
     def _plays(self, loaded: Loaded) -> Reply:
         """Who can play it."""
-        try:
-            script = self._has_script("")
-        except ScenarioError:  # the variant with it has mistakes, which are told where it is opened
-            script = False
+        program = compiled(loaded)
+        seats = [{"seat": seat, "script": self._has_script(seat, program, "")} for seat in seats_of(program)]
         rivals = list(loaded.scenario.rivals) if isinstance(loaded, LoadedScenario) else []
         declared = loaded.resolved.tree.entry(loaded.resolved.kind)
         names = {self._scenario.stem, loaded.name, *([] if declared is None else [str(declared.value)])}
-        return {"names": sorted(names), "script": script, "rivals": rivals}
+        return {"names": sorted(names), "rivals": rivals, "seats": seats}
 
-    def begin(self, room: Room = _FIRST, player: str = "me", variant: str = "") -> Reply:
-        """Begin an episode.
+    def begin(
+        self,
+        room: Room = _FIRST,
+        player: str = "me",
+        variant: str = "",
+        seat: Seat = AGENT,
+        others: Mapping[Seat, str] = _NOBODY_ELSE,
+    ) -> Reply:
+        """Begin an episode in a room; for the other arguments see `Casting`."""
+        return self._begin(room, Casting(player, variant, seat, dict(others)))
 
-        Args:
-            room: which.
-            player: `me`, `script`, `random`, `shipped:NAME`, or the folder of a run.
-            variant: variants and parameters behind the scenario's name.
-        """
+    def _begin(self, room: Room, casting: Casting) -> Reply:
         if not self._texts:
             raise RefusalError("there is no scenario yet")
-        if (player, variant) != (self._player, self._variant):
-            self._choose(player, variant)
+        if casting != self._casting:
+            self._use(load(f"{self._scenario}{casting.variant}", self._texts), casting)
         stage, tracing = self._playing()
         tracing.title = _title(room)
         try:
@@ -119,7 +156,7 @@ class Session:
         """Begin an episode, and play it as far as it is shown; without acts a script plays, if there is one."""
         player = "me"
         if shown.acts is None:
-            player = "script" if self._has_script(shown.variant) else "me"
+            player = "script" if self._scripts_agent(shown.variant) else "me"
         self.begin(shown.room, player, shown.variant)
         stage, _ = self._playing()
         seats = [self._seat()]
@@ -139,8 +176,9 @@ class Session:
                 | {"format": "socialai-trace/1"},
                 "phrases": self._phrases.sentences()[:2000],
                 "rules": list(stage.env.counters()["rules"]),
-                "player": self._player,
-                "variant": self._variant,
+                "player": self._casting.player,
+                "variant": self._casting.variant,
+                "others": dict(self._others),
                 "room": self._room.model_dump(exclude_none=True),
                 "seats": seats,
             }
@@ -166,14 +204,14 @@ class Session:
         stage, _ = self._playing()
         if not self._prepared and stage.running.all() and stage.steps == 0:
             self._prepared = True
-            stage.rehearse({AGENT: stage.env.encode_action((None, None))[None]}, stage.env.explain)
+            stage.rehearse({stage.own: stage.env.encode_action((None, None))[None]}, stage.env.explain)
 
     def auto(self) -> Reply:
         """Let the chosen player play a step."""
         stage, _ = self._playing()
         if not stage.running.all():
             raise RefusalError(_ENDED)
-        action = self._policy.act(stage.observations[AGENT])
+        action = self._policy.act(stage.observations[stage.own])
         assert not isinstance(action, Awaitable), "internal: nobody answers later here"
         return self._step(action, thought_of(self._policy))
 
@@ -186,7 +224,7 @@ class Session:
             stage.back()
         self._begin_anew()
         for moment in stage.moments[:-1]:  # it remembers what it has seen, and what it has drawn
-            self._policy.act(moment.observations[AGENT])
+            self._policy.act(moment.observations[stage.own])
         return {"length": to}
 
     def place(self, who: str, at: tuple[int, int]) -> Reply:
@@ -213,7 +251,7 @@ class Session:
         if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
             raise RefusalError(f"{who} cannot be put there")
         known = self._room.model_copy(update={"layout": layout})
-        return self.begin(known, self._player, self._variant)
+        return self._begin(known, self._casting)
 
     def look(self, who: str) -> Reply:
         """The cells that a member of the cast sees now."""
@@ -225,13 +263,15 @@ class Session:
             raise RefusalError(f"there is nobody called {who!r} in the cast")
         if self._gaze is None or self._gaze[:2] != (id(checked), number):
             assert self._loaded is not None, "internal: what is played was loaded"
-            self._gaze = id(checked), number, Gaze(self._loaded, checked, number)
+            seats = seats_of(stage.env.program)
+            own = seats.index(stage.own) if len(seats) > 1 else None
+            self._gaze = id(checked), number, Gaze(self._loaded, checked, number, own)
         *_, gaze = self._gaze
         reset = reset_arguments(**self._room.model_dump())
-        images = [moment.observations[AGENT]["image"][0] for moment in stage.moments]
+        images = [moment.observations[stage.own]["image"][0] for moment in stage.moments]
         gaze.begin(reset.get("seed"), reset["options"], images[0])
         for moment, image in zip(tracing.tracer.moments[1:], images[1:], strict=True):
-            gaze.follow(np.array(moment.action, np.int64), image)
+            gaze.follow([moment.action, *(seat.action for seat in moment.seats)], image)
         width = env.describe()["room"]["width"]
         cells = sorted(y * width + x for x, y in gaze.cells(begins=stage.steps == 0) if x < width)
         return {"who": who, "step": stage.steps, "side": checked.entities[number].view, "cells": cells}
@@ -274,7 +314,9 @@ class Session:
         stage, tracing = self._playing()
         if not stage.steps:
             raise RefusalError("nothing was played yet; a test is made of what was played")
-        called, reset = f"{self._scenario}{self._variant}", reset_arguments(**self._room.model_dump())
+        if stage.own != AGENT or self._others != self._usual(stage.env.program, self._casting):
+            raise RefusalError("a test plays the agent beside scripts; begin the episode again so")
+        called, reset = f"{self._scenario}{self._casting.variant}", reset_arguments(**self._room.model_dump())
         taken = TakenDialogue()
         loaded = load(called, self._texts)
         rooms = Rooms(ScenarioEnv(compile_loaded(loaded), scenarios=scenarios_of(loaded)), [taken])
@@ -297,42 +339,73 @@ class Session:
 
     # -- within ----------------------------------------------------------------------------------------------
 
-    def _use(self, loaded: Loaded) -> None:
-        """Play this from now on."""
-        self._loaded, self._gaze = loaded, None
-        program = compile_loaded(loaded)
-        env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
+    def _use(self, loaded: Loaded, casting: Casting) -> None:
+        """Play this from now on, and so.
+
+        Raises:
+            RefusalError: somebody who is to play cannot.
+        """
+        if casting.player == SCRIPT and casting.seat == AGENT:
+            loaded = closest_script(f"{self._scenario}{casting.variant}", loaded, self._texts).loaded
+        program = compiled(loaded)
+        _require_seat(casting, program)
+        others = self._usual(program, casting) | dict(casting.others)
+        filled: dict[Seat, Any] | None = None
+        words: dict[Seat, str] = {}
+        if others:
+            loaded, filled, words = self._seated(loaded, program, casting, others)
+            program = compiled(loaded)
+        company, partners = remembering(filled)
+        env = make_loaded(loaded, seats=company)
+        endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
+        tracing = Tracing(Tracer(env, loaded.name, casting.player, endings, about_of(loaded), words))
+        stage = Stage(env, [tracing], partners)
+        policy: Policy = RandomPolicy(stage.action_sizes)
+        if casting.player != "me":
+            policy = _policy("oracle" if casting.player == SCRIPT else casting.player, env)
+        self._loaded, self._gaze, self._game, self._casting = loaded, None, (stage, tracing), casting
+        self._others, self._policy, self._prepared = others, policy, False
         self._phrases = Phrases(program.actions, program.sentences)
         self._text_view, self._briefing = TextView(program, "grid"), brief(loaded)
-        endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
-        tracing = Tracing(Tracer(env, loaded.name, "me", endings, about_of(loaded)))
-        self._game = Stage(env, [tracing]), tracing
-        self._policy, self._prepared = RandomPolicy(self._game[0].action_sizes), False
+
+    def _usual(self, program: Playable, casting: Casting) -> dict[Seat, str]:
+        """Who plays other seats than the own one unless something else is said."""
+        return {
+            seat: SCRIPT if self._has_script(seat, program, casting.variant) else NOBODY
+            for seat in seats_of(program)
+            if seat != casting.seat
+        }
+
+    def _seated(
+        self, loaded: Loaded, program: Playable, casting: Casting, others: Mapping[Seat, str]
+    ) -> tuple[Loaded, dict[Seat, Any] | None, dict[Seat, str]]:
+        """What is made for one who plays beside others, what fills their seats there, and who they are in words."""
+        name = f"{self._scenario}{casting.variant}"
+        if casting.seat in others:
+            raise RefusalError(f"got another player for {casting.seat}, whom {casting.player} plays already")
+        try:
+            partners = partners_of(list(others.items()), name, program)
+            loaded, filled = seating(partners, name, loaded, self._texts)
+        except OptionError as error:
+            raise RefusalError(error.said) from None
+        except (UsageError, ValueError, OSError) as error:
+            raise RefusalError(str(error)) from None
+        return loaded, filled, sitting(program, partners, casting.seat)
 
     def _begin_anew(self) -> None:
         """Let the player forget everything."""
         self._policy.reset(np.ones(1, np.bool_), np.array([self._room.seed]))
 
-    def _has_script(self, variant: str) -> bool:
-        """Whether the agent of a variant has a script."""
-        return not unscripted(closest_script(f"{self._scenario}{variant}", texts=self._texts).loaded)
+    def _has_script(self, seat: Seat, program: Playable, variant: str) -> bool:
+        """Whether a seat of a variant has a script."""
+        return self._scripts_agent(variant) if seat == AGENT else has_script(program, seat)
 
-    def _choose(self, player: str, variant: str) -> None:
-        """Change the player, or what is played."""
-        name = f"{self._scenario}{variant}"
-        loaded = load(name, self._texts)
-        if player == "script":
-            loaded = closest_script(name, loaded, self._texts).loaded
-            if unscripted(loaded):
-                raise RefusalError(
-                    "the agent has no script: it follows no frame, and there is no variant `oracle`"
-                )
-        self._use(loaded)
-        self._player, self._variant = "me", variant
-        stage, tracing = self._playing()
-        if player != "me":
-            self._policy = _policy("oracle" if player == "script" else player, stage.env)
-        self._player = tracing.tracer.agent = player
+    def _scripts_agent(self, variant: str) -> bool:
+        """Whether the agent of a variant has a script, perhaps in the variant `oracle` of that."""
+        try:
+            return not unscripted(closest_script(f"{self._scenario}{variant}", texts=self._texts).loaded)
+        except ScenarioError:  # the variant with it has mistakes, which are told where it is opened
+            return False
 
     def _playing(self) -> tuple[Stage, Tracing]:
         if self._game is None:
@@ -344,11 +417,12 @@ class Session:
         if not stage.running.all():
             raise RefusalError(_ENDED)
         before, tracing.thought = tracing.tracer.counts(), thought
-        image = stage.observations[AGENT]["image"][0].copy()
+        image = stage.observations[stage.own]["image"][0].copy()
         try:
-            step = stage.step({AGENT: action})
+            step = stage.step({stage.own: action})
         except (ValueError, RoomError) as error:
-            who = "" if self._player == "me" else f"{self._player} chose what cannot be done: "
+            player = self._casting.player
+            who = "" if player == "me" else f"{player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
         more = tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)
         movement = (*stage.env.program.actions, None)[action[0, 0]]
@@ -359,7 +433,7 @@ class Session:
         """What whoever plays is told, sees and hears, as a language model reads it."""
         stage, _ = self._playing()
         assert self._text_view is not None, "internal: what is played has a view"
-        observation = {name: value[0] for name, value in stage.observations[AGENT].items()}
+        observation = {name: value[0] for name, value in stage.observations[stage.own].items()}
         return {
             "told": self._text_view.task(self._briefing.text(stage.info.get("member"))),
             "seen": self._text_view.observe(observation, stage.info, last),
@@ -382,6 +456,16 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "write_test": Session.write_test,
 }
 """What a window may ask a session for, by name."""
+
+
+def _require_seat(casting: Casting, program: Playable) -> None:
+    """See that the player's seat exists, and has a script if that plays. Raises RefusalError."""
+    seats = seats_of(program)
+    if casting.seat not in seats:
+        raise RefusalError(f"there is no seat {casting.seat!r}, only {', '.join(seats)}")
+    if casting.player == SCRIPT and not has_script(program, casting.seat):
+        oracle = ", and there is no variant `oracle`" if casting.seat == AGENT else ""
+        raise RefusalError(f"the {casting.seat} has no script: it follows no frame{oracle}")
 
 
 def _policy(run: str, env: Any) -> Policy:

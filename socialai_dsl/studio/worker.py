@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from socialai_dsl.authoring.server import make_server
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.envs.seats import NOBODY
 from socialai_dsl.studio.files import FileError, Folder
 from socialai_dsl.studio.judging import JUDGED
 from socialai_dsl.studio.messages import QUESTIONS, Question, RefusalError, Refused, parsed
@@ -102,6 +103,11 @@ class Desk:
             more["path"] = str(self._folder.path(more["path"]))
         if "player" in more:
             more["player"] = self._folder.player(more["player"])
+        if "others" in more:
+            more["others"] = {
+                seat: who if who == NOBODY else self._folder.player(who)
+                for seat, who in more["others"].items()
+            }
         if question.do in JUDGED:
             return JUDGED[question.do](**more)
         return ASKED[question.do](self._session, **more)

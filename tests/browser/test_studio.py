@@ -19,6 +19,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.cli.main import run_main
 from socialai_dsl.llm import Episode, TextView
+from socialai_dsl.llm.view import LastStep
 
 pytest.importorskip("starlette", reason="no test of the studio without the extra `studio`")
 
@@ -768,3 +769,74 @@ def test_a_file_that_is_no_text_is_refused_and_the_open_one_stays(studio: Page, 
     studio.locator(".message", has_text="binary.yaml").wait_for()
     assert studio.locator("h1").inner_text() == "talkitout.yaml"
     assert "scenario: talkitout" in studio.locator(".cm-content").inner_text()
+
+
+@pytest.fixture
+def levers(page: Page, server: Server, folder: Path) -> Page:
+    """The studio with a scenario of two seats."""
+    for name in ("levers_together.yaml", "levers_together_oracle.yaml"):
+        shutil.copy(SCENARIOS / "together" / name, folder)
+    page.goto(server.address)
+    drawn(page)
+    with another_room(page):
+        page.get_by_label("scenario", exact=True).and_(page.locator("select")).select_option(
+            "levers_together.yaml"
+        )
+    return page
+
+
+def test_a_person_plays_another_seat_beside_a_script(levers: Page, tmp_path: Path) -> None:
+    beside = sd.make("together/levers_together+oracle", seats={"agent": "script"}).unwrapped
+    observation, info = beside.reset(seed=SEED)
+    reads = TextView(beside.program, "grid")  # type: ignore[attr-defined]
+    begin(levers, SEED)
+    with another_room(levers):
+        levers.get_by_label("whose seat").select_option("partner")
+    assert levers.get_by_label("who plays agent").input_value() == "script"
+    levers.get_by_role("checkbox", name="as Bob sees it").check()
+    assert levers.locator(".seat h2").inner_text().lower() == "as bob sees it"
+    assert levers.locator(".seat pre").text_content() == reads.observe(observation, info)
+    for hidden in (".stage", ".seats", ".why"):
+        assert not levers.locator(hidden).first.is_visible()
+    levers.keyboard.press("ArrowUp")
+    levers.locator(".controls output", has_text="step 1").wait_for()
+    before = observation
+    observation, _, _, _, info = beside.step(beside.encode_action(("forward", None)))  # type: ignore[attr-defined]
+    seen = reads.observe(observation, info, LastStep("forward", before["image"]))
+    assert levers.locator(".seat pre").text_content() == seen
+
+    levers.get_by_role("checkbox", name="as Bob sees it").uncheck()
+    rows = levers.locator(".seats tbody tr").all_inner_texts()
+    assert ["script" in rows[0], "me" in rows[1], "forward" in rows[1]] == [True] * 3
+    with levers.expect_download() as download:
+        levers.get_by_role("button", name="Replay").click()
+    page = tmp_path / "exported.html"
+    download.value.save_as(page)
+    replay = levers.context.new_page()
+    replay.goto(page.as_uri())
+    assert replay.locator(".seats tbody tr").count() == 2
+    replay.close()
+
+
+def test_the_other_seat_is_left_empty_and_a_script_is_watched_on_it(levers: Page) -> None:
+    with another_room(levers):
+        levers.get_by_label("who plays partner").select_option("nobody")
+    levers.keyboard.press("ArrowUp")
+    reach(levers, 1)
+    assert levers.locator(".seats tbody tr").nth(1).locator("td").nth(1).inner_text() == "none"
+    with another_room(levers):
+        levers.get_by_label("whose seat").select_option("partner")
+    with another_room(levers):
+        levers.get_by_label("who plays", exact=True).select_option("script")
+    levers.get_by_role("button", name="watch").click()
+    levers.locator(".message.good", has_text="success").wait_for()
+    assert levers.evaluate(NAMELESS) == []
+    with another_room(levers):
+        levers.get_by_role("button", name="again").click()
+    assert levers.get_by_label("whose seat").input_value() == "partner"
+    assert levers.get_by_label("who plays agent").input_value() == "script"
+
+
+def test_where_one_plays_alone_there_are_no_seats_to_choose(studio: Page) -> None:
+    assert not studio.get_by_label("whose seat").is_visible()
+    assert not studio.locator(".seats").is_visible()

@@ -2,7 +2,7 @@
 /** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
 import { make } from "./dom.js";
 import { Editor } from "./editor.js";
-import { Cast, Mind, Rules, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
+import { Cast, Mind, Rules, Seats, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { claimItems, findingItems, marked, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
 import { Counts, Seat, Views } from "./parts.js";
@@ -27,6 +27,7 @@ class Studio {
     /** What is played: the room, and variants and parameters behind the scenario's name.
      * @type {{room: Record<string, any>, variant: string}} */
     this.place = { room: { seed: 0 }, variant: "" };
+    /** @type {Record<string, string>} who has the other seats in the episode that is shown */ this.casting = {};
     this.length = 0;
     /** @type {Episode | null} */ this.episode = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */ this.timer = undefined;
@@ -47,7 +48,7 @@ class Studio {
     this.counts = new Counts(goTo);
     this.seat = new Seat();
     this.views = new Views(() => this.show());
-    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: this.views, counts: this.counts, mind: new Mind((step) => this.back(step)) };
+    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: this.views, counts: this.counts, mind: new Mind((step) => this.back(step)), seats: new Seats() };
     this.parts = [this.stage, this.seat, ...Object.values(parts)];
     this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
     this.state = make("output", { class: "quiet", "aria-live": "polite" });
@@ -60,8 +61,13 @@ class Studio {
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.another({ seed: Number(this.seedField.value) }) });
     this.roomField = make("input", { type: "number", min: 0, value: 0, "aria-label": "number of the room", title: "which room of the seed, as checks number them", onchange: () => this.another({ seed: Number(this.seedField.value), index: Number(this.roomField.value) }) });
     this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin() });
-    /** @type {Reply} who can play, besides me and chance */ this.plays = { names: [], script: false, rivals: [] };
+    this.own = make("select", { "aria-label": "whose seat", onchange: () => this.begin() });
+    this.companions = make("span", { class: "others", role: "group", "aria-label": "who has the other seats" });
+    this.company = make("div", { class: "controls company", hidden: true }, make("label", {}, "on the seat of ", this.own), this.companions);
+    /** @type {{names: string[], rivals: string[], seats: {seat: string, script: boolean}[]}} who can play, besides me and chance */
+    this.plays = { names: [], rivals: [], seats: [{ seat: "agent", script: false }] };
     this.seated = make("input", { type: "checkbox", onchange: () => this.sit() });
+    this.seatedAs = make("span");
     this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
     this.count = make("output", {});
     this.thing = make("select", { "aria-label": "thing to move", onchange: () => this.moving(null) });
@@ -107,7 +113,7 @@ class Studio {
       button("Another room", () => this.next(), "the next seed (N)"), make("label", {}, "seed ", this.seedField), make("label", {}, "room ", this.roomField),
       button("◂ step back", () => this.back(this.length - 1), "take the last step back, chance included (U)"), this.count,
       make("label", {}, "plays: ", this.players),
-      make("label", { title: "hide the room, the states, the rules and the text" }, this.seated, " as the agent sees it"), this.watch,
+      make("label", { title: "hide the room, the states, the rules and the text" }, this.seated, " ", this.seatedAs), this.watch,
       button("one step", () => this.auto(), "let whoever plays do one step"));
     const say = make("form", { class: "controls say", onsubmit: (/** @type {Event} */ event) => this.submit(event) },
       this.template, this.words, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
@@ -120,7 +126,7 @@ class Studio {
     return make("div", { class: "studio" }, bar,
       this.writing.root, this.writing.handle,
       make("main", {}, this.stage.root, this.message,
-        make("div", { class: "below" }, this.seat.root, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root))),
+        make("div", { class: "below" }, this.seat.root, this.moves, say, game, this.company, arrange, ...[parts.seats, parts.mind, parts.why].map((one) => one.root))),
       make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
   }
 
@@ -147,22 +153,47 @@ class Studio {
 
   /** Who can play this scenario; agents that were trained on others come last, and apart. */
   offerPlayers() {
-    const { names, script, rivals } = this.plays, chosen = this.players.value || "me";
-    const option = (/** @type {string} */ value, word = value) => make("option", { value, selected: value === chosen }, word);
-    /** @type {Reply[]} */ const agents = this.offered?.agents ?? [];
-    const own = agents.filter((one) => names.includes(one.scenario)), others = agents.filter((one) => !names.includes(one.scenario));
-    const group = (/** @type {string} */ label, /** @type {HTMLOptionElement[]} */ options) => (options.length ? [make("optgroup", { label }, ...options)] : []);
-    this.players.replaceChildren(option("me"), ...(script ? [option("script")] : []), option("random"),
-      ...group("rivals, which lack the skill", rivals.map((/** @type {string} */ name) => option(`+${name}`, `rival ${name}`))),
-      ...group("trained on it", own.map((one) => option(one.name))),
-      ...group("trained on other scenarios", others.map((one) => option(one.name, one.scenario && !one.name.endsWith(one.scenario) ? `${one.name} (${one.scenario})` : one.name))));
+    const { rivals, seats } = this.plays, own = this.own.value || "agent", script = seats.some((one) => one.seat === own && one.script);
+    this.players.replaceChildren(...this.options(this.players.value || "me", [["me", "me"], ...(script ? [["script", "script"]] : []), ["random", "random"]],
+      own === "agent" ? rivals.map((name) => [`+${name}`, `rival ${name}`]) : []));
   }
 
-  /** Who plays, and what is played: a rival is a variant of the scenario, with a script. */
+  /** Who can be chosen: these, and trained agents.
+   * @param {string} chosen @param {string[][]} first value and word @param {string[][]} rivals likewise */
+  options(chosen, first, rivals = []) {
+    const option = (/** @type {string[]} */ [value, word]) => make("option", { value, selected: isCalled(chosen, value) }, word);
+    const trained = (/** @type {Reply} */ { name, scenario }, apart = false) => option([name, apart && scenario && !name.endsWith(scenario) ? `${name} (${scenario})` : name]);
+    /** @type {Reply[]} */ const agents = this.offered?.agents ?? [];
+    const isOwn = (/** @type {Reply} */ one) => this.plays.names.includes(one.scenario);
+    const group = (/** @type {string} */ label, /** @type {HTMLOptionElement[]} */ options) => (options.length ? [make("optgroup", { label }, ...options)] : []);
+    return [...first.map(option), ...group("rivals, which lack the skill", rivals.map(option)),
+      ...group("trained on it", agents.filter(isOwn).map((one) => trained(one))),
+      ...group("trained on other scenarios", agents.filter((one) => !isOwn(one)).map((one) => trained(one, true)))];
+  }
+
+  /** Who has which seat, where there are several. @param {string} own @param {Record<string, string>} others */
+  offerSeats(own, others) {
+    const { seats } = this.plays, { episode } = this;
+    this.company.hidden = seats.length === 1;
+    const called = (/** @type {string} */ seat) => (episode && episode.called(seat) !== seat ? `${seat} “${episode.called(seat)}”` : seat);
+    this.own.replaceChildren(...seats.map(({ seat }) => make("option", { value: seat, selected: seat === own }, called(seat))));
+    this.companions.replaceChildren(...seats.filter(({ seat }) => seat !== own).map(({ seat, script }) =>
+      make("label", {}, `${called(seat)}: `, make("select", { "aria-label": `who plays ${seat}`, "data-seat": seat, onchange: () => this.begin() },
+        ...this.options(others[seat], [...(script ? [["script", "script"]] : []), ["random", "random"], ["nobody", "nobody"]])))));
+  }
+
+  /** Who plays where, and what is played: a rival is a variant of the scenario, with a script. */
   chosen() {
-    const { value } = this.players, { variant } = this.place, isRival = (/** @type {string} */ name) => this.plays.rivals.includes(name.slice(1));
-    if (value.startsWith("+")) return { player: "script", variant: value };
-    return { player: value || "me", variant: isRival(variant) ? "" : variant };
+    const { value } = this.players, { variant } = this.place, seat = this.own.value || "agent";
+    const selects = /** @type {HTMLSelectElement[]} */ ([...this.companions.querySelectorAll("select")]).filter(({ dataset }) => dataset.seat !== seat);
+    const others = Object.fromEntries(selects.map(({ dataset, value: who }) => [dataset.seat, who]));
+    if (value.startsWith("+")) return { player: "script", variant: seat === "agent" ? value : "", seat, others };
+    return { player: value || "me", variant: this.isRival(variant) ? "" : variant, seat, others };
+  }
+
+  /** Whether a variant is a rival. @param {string} variant */
+  isRival(variant) {
+    return this.plays.rivals.includes(variant.slice(1));
   }
 
   // -- the text --------------------------------------------------------------------------------------------------
@@ -366,10 +397,7 @@ class Studio {
     this.writing.count("Findings", findings.length ? String(findings.length) : "", findings.some((/** @type {Reply} */ one) => one.error) ? "bad" : "open");
     if (findings.some((/** @type {Reply} */ one) => one.error)) this.writing.choose("Findings");
     this.stage.root.classList.toggle("stale", !drawn.episode);
-    if (drawn.plays) {
-      this.plays = drawn.plays;
-      this.offerPlayers();
-    }
+    if (drawn.plays) this.plays = drawn.plays;
     if (drawn.episode) {
       this.counts.forget();
       this.episode = null;
@@ -385,7 +413,11 @@ class Studio {
     this.seat.moments = begun.seats;
     this.counts.names = begun.rules;
     this.length = this.episode.length;
-    this.players.value = begun.player === "script" && this.plays.rivals.includes(begun.variant.slice(1)) ? begun.variant : begun.player;
+    this.casting = begun.others;
+    this.offerSeats(this.episode.own, begun.others);
+    this.offerPlayers();
+    this.players.value = begun.player === "script" && this.isRival(begun.variant) ? begun.variant : ([...this.players.options].find(({ value }) => isCalled(begun.player, value))?.value ?? "me");
+    this.seatedAs.textContent = `as ${this.plays.seats.length > 1 ? this.episode.called(this.episode.own) : "the agent"} sees it`;
     this.place = { room: begun.room, variant: begun.variant };
     this.seedField.value = String(begun.room.seed);
     this.roomField.value = String(begun.room.index ?? 0);
@@ -411,12 +443,12 @@ class Studio {
   }
 
   /** Begin an episode where the last one was, or elsewhere. */
-  async begin(room = this.place.room, { player, variant } = this.chosen()) {
+  async begin(room = this.place.room, casting = this.chosen()) {
     this.pause();
-    const begun = await this.line.ask("begin", { room, variant, player });
+    const begun = await this.line.ask("begin", { room, ...casting });
     if (begun.refused) {
       this.tell(begun.refused);
-      if (!begun.lost) this.players.value = "me";
+      if (!begun.lost) this.restore();
       if (begun.lost) this.draw();
       return;
     }
@@ -424,10 +456,18 @@ class Studio {
     this.take(begun.episode);
   }
 
+  /** Let the choices be those of the episode that is shown, played by me. */
+  restore() {
+    if (!this.episode) return;
+    this.offerSeats(this.episode.own, this.casting);
+    this.offerPlayers();
+    this.players.value = "me";
+  }
+
   /** Begin in another room, without what was known of the last one. @param {Record<string, any>} room */
   another(room) {
-    const { player, variant } = this.chosen();
-    this.begin(room, { player, variant: player === "script" && this.plays.rivals.includes(variant.slice(1)) ? variant : "" });
+    const casting = this.chosen(), { player, variant } = casting;
+    this.begin(room, { ...casting, variant: player === "script" && this.isRival(variant) ? variant : "" });
   }
 
   /** The next seed. */
@@ -777,6 +817,7 @@ class Studio {
     if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${seated ? (ended.success ? "success" : "no success") : outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
     this.views.choose(episode, length);
+    if (seated) episode.viewer = episode.own;
     if (!this.views.member) this.stage.seen = undefined;
     for (const part of this.parts) part.show(episode, length);
     this.gaze();
@@ -796,6 +837,12 @@ class Studio {
     this.stage.seen = new Set(found.cells);
     if (episode) for (const part of [this.stage, views]) part.show(episode, length);
   }
+}
+
+/** Whether a player of an episode is the one that is offered by this name: runs are offered as seen from the folder.
+ * @param {string} player @param {string} name */
+function isCalled(player, name) {
+  return player === name || player?.endsWith(`/${name}`);
 }
 
 new Studio();

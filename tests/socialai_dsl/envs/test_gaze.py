@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs import ScenarioEnv
@@ -30,6 +31,17 @@ def square(described: dict[str, Any], who: str, side: int) -> set[tuple[int, int
     }
 
 
+def pictured(described: dict[str, Any], who: str, image: NDArray[np.uint8]) -> set[tuple[int, int]]:
+    """The cells that somebody's picture shows, and where it stands."""
+    (x, y), (dx, dy) = described[who]["at"], AHEAD[described[who]["facing"]]
+    return {
+        (x + ahead * dx - right * dy, y + ahead * dy + right * dx)
+        for ahead in range(7)
+        for right in range(-3, 4)
+        if image[right + 3, 6 - ahead, 0] != 0 or (ahead, right) == (0, 0)
+    }
+
+
 @pytest.mark.parametrize("name", ["talkitout", "school/doors", "school/levers"])
 def test_what_the_agent_sees_is_what_its_picture_shows(name: str) -> None:
     """Where opaque things hide others, too."""
@@ -42,13 +54,7 @@ def test_what_the_agent_sees_is_what_its_picture_shows(name: str) -> None:
         gaze.begin(seed, None, observation["image"])
         for step in range(25):
             described, image = env.describe(), observation["image"]
-            (x, y), (dx, dy) = described["agent"]["at"], AHEAD[described["agent"]["facing"]]
-            shown = {
-                (x + ahead * dx - right * dy, y + ahead * dy + right * dx)
-                for ahead in range(7)
-                for right in range(-3, 4)
-                if image[right + 3, 6 - ahead, 0] != 0 or (ahead, right) == (0, 0)
-            }
+            shown = pictured(described, "agent", image)
             room = {
                 (i, j) for i in range(described["room"]["width"]) for j in range(described["room"]["height"])
             }
@@ -56,7 +62,7 @@ def test_what_the_agent_sees_is_what_its_picture_shows(name: str) -> None:
             hidden += len(square(described, "agent", 7) & room - shown)
             action = random.integers(0, env.action_space.nvec, dtype=np.int64)  # type: ignore[attr-defined]
             observation, _, terminated, truncated, _ = env.step(action)
-            gaze.follow(action, observation["image"])
+            gaze.follow([action], observation["image"])
             if terminated or truncated:
                 break
     assert (hidden > 0) is (name != "talkitout")
@@ -95,7 +101,34 @@ def test_the_view_square_is_the_members_own(tmp_path: Path) -> None:
             assert gaze.cells(begins=step == 0) == square(env.describe(), who, side) & room
             action = env.encode_action((None, None))
             observation = env.step(action)[0]
-            gaze.follow(action, observation["image"])
+            gaze.follow([action], observation["image"])
+
+
+@pytest.mark.parametrize("others", [{"agent": "random"}, {"partner": "random"}, {"partner": "script"}])
+def test_with_several_seats_it_follows_what_all_of_them_do(others: dict[str, str]) -> None:
+    loaded = load("together/levers_together")
+    env = ScenarioEnv(compile_loaded(loaded), scenarios=scenarios_of(loaded), seats=others)
+    own = env.seats.index(env.seat_names[0])
+    gazes = {
+        seat: Gaze(loaded, scenarios_of(loaded)[0], number, own) for number, seat in enumerate(env.seats)
+    }
+    observation, _ = env.reset(seed=1)
+    for gaze in gazes.values():
+        gaze.begin(1, None, observation["image"])
+    random, seen = np.random.default_rng(0), set()
+    room = {(x, y) for x in range(9) for y in range(5)}
+    for step in range(20):
+        for seat, gaze in gazes.items():
+            shown = pictured(env.describe(), seat, env.seat_moment(seat).observation["image"])
+            assert gaze.cells(begins=step == 0) & room == shown & room
+            seen.add((seat, frozenset(shown)))
+        action = random.integers(0, env.action_space.nvec, dtype=np.int64)  # type: ignore[attr-defined]
+        observation, _, terminated, truncated, _ = env.step(action)
+        for gaze in gazes.values():
+            gaze.follow([env.seat_moment(seat).action for seat in env.seats], observation["image"])
+        if terminated or truncated:
+            break
+    assert len(seen) > 4, "somebody has moved"
 
 
 def test_of_a_suite_the_member_is_asked_that_has_it() -> None:

@@ -114,7 +114,7 @@ def test_a_script_takes_a_seat_over_and_gives_it_back(two: str) -> None:
     [
         ("bbo", "script", "expected one of agent, bob; did you mean 'bob'"),
         ("agent", "script", "whose actions are those of `step`"),
-        ("bob", "nobody", "expected 'script', 'random' or a policy"),
+        ("bob", "somebody", "expected 'script', 'random', 'nobody' or a policy"),
     ],
 )
 def test_mistakes_about_seats(two: str, seat: str, player: str, words: str) -> None:

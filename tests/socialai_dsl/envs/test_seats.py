@@ -121,6 +121,22 @@ def test_a_policy_fills_a_seat(two: str) -> None:
     assert policy.begun == 6
 
 
+def test_nobody_on_a_seat_stays_and_is_silent(two: str) -> None:
+    env = sd.make(two, seats={"bob": "nobody"}).unwrapped
+    env.reset(seed=1)
+    before = env.describe()["bob"]  # type: ignore[attr-defined]
+    still = env.encode_action((None, None))  # type: ignore[attr-defined]
+    scripted = sd.make(two, seats={"bob": "script"})
+    scripted.reset(seed=1)
+    assert scripted.step(still)[4]["utterance"] == "Bob: Say hello"
+    for _ in range(3):
+        *_, info = env.step(still)
+        moment = env.seat_moment("bob")  # type: ignore[attr-defined]
+        assert (info["utterance"], moment.did) == ("NA", "none")
+    after = env.describe()["bob"]  # type: ignore[attr-defined]
+    assert (after["at"], after["facing"]) == (before["at"], before["facing"])
+
+
 def test_chance_on_a_seat_depends_on_the_episode_alone(two: str) -> None:
     heard = {}
     for count in (1, 3):
@@ -147,7 +163,7 @@ def test_one_plays_another_member(two: str) -> None:
     [
         ("each", "expected 'agent', 'all', or a mapping"),
         ({"rob": "script"}, "expected one of agent, bob; did you mean 'bob'"),
-        ({"bob": "scirpt"}, "expected 'script', 'random' or a policy"),
+        ({"bob": "scirpt"}, "expected 'script', 'random', 'nobody' or a policy"),
         ({"bob": 3}, "a policy with `reset` and `act`"),
         ({"agent": "script"}, "the agent of two follows no frame"),
         ({"agent": "random", "bob": "random"}, "expected one left for the actions of `step`"),

@@ -87,6 +87,6 @@ def test_seats_that_cannot_be_filled(named: list[tuple[str, str]], said: str) ->
 
 def test_a_partner_that_cannot_be_asked_here() -> None:
     with pytest.raises(
-        UsageError, match="got 'human' for partner, expected script, random or a trained agent"
+        UsageError, match="got 'human' for partner, expected script, random, nobody or a trained agent"
     ):
         seating({"partner": Player("human")}, LEVERS, load(LEVERS))

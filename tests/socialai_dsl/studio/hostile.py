@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 GAME: list[dict[str, Any]] = [
     {"do": "draw", "path": "talkitout.yaml", "text": "scenario: x\n", "room": {"seed": 3, "layout": {}}},
     {"do": "begin", "room": {"seed": 3, "index": 2}, "player": "random", "variant": ""},
+    {"do": "begin", "seat": "agent", "others": {"bob": "nobody"}},
     {
         "do": "show",
         "shown": {"room": {"test_episode": 1}, "variant": "+oracle", "acts": ["left", "How are you"]},

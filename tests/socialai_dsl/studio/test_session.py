@@ -13,10 +13,11 @@ import socialai_dsl as sd
 from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.episodes.play import AGENT
-from socialai_dsl.llm import Episode
+from socialai_dsl.llm import Episode, TextView
+from socialai_dsl.llm.view import LastStep
 from socialai_dsl.studio.judging import judge_claims, judge_tests
 from socialai_dsl.studio.messages import RefusalError, Room, Shown
-from socialai_dsl.studio.session import Session
+from socialai_dsl.studio.session import Casting, Session
 from tests.socialai_dsl.studio.shy import SHY
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -69,7 +70,7 @@ def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path
 def test_a_page_finds_the_directions_of_the_observation_again(name: str) -> None:
     """In its picture directions are turned as on a screen; `observed` of the page turns them back."""
     session = Session()
-    session._use(sd.load(name))
+    session._use(sd.load(name), Casting())
     stage, tracing = session._playing()
     stage.begin({"seed": 0})
     random, looks = np.random.default_rng(0), list[list[int]]()
@@ -239,9 +240,9 @@ def test_a_violated_claim_leads_to_its_room_and_its_step(
     # A strategy that lacks the skill plays to the end.
     *_, last = moments(session.show(Shown.model_validate(rival["shown"])))
     assert last["ended"]["success"]
-    assert (session._player, session._variant) == ("script", "+hasty")
+    assert session._casting == Casting("script", "+hasty")
     session.begin()
-    assert (session._player, session._variant) == ("me", "")
+    assert session._casting == Casting()
 
 
 def test_a_failing_test_leads_to_the_step_with_which_something_is_wrong(shy: tuple[Session, str]) -> None:
@@ -319,11 +320,15 @@ def test_an_episode_begins_again_where_it_began(session: Session) -> None:
 
 
 def test_it_says_who_can_play(shy: tuple[Session, str], session: Session, path: Path) -> None:
-    assert shy[0].draw(shy[1], SHY)["plays"] == {"names": ["shy"], "script": False, "rivals": ["hasty"]}
+    assert shy[0].draw(shy[1], SHY)["plays"] == {
+        "names": ["shy"],
+        "rivals": ["hasty"],
+        "seats": [{"seat": "agent", "script": False}],
+    }
     copied = path.with_name("talkitout_2.yaml")
     for file, names in ((path, ["talkitout"]), (copied, ["talkitout", "talkitout_2"])):
         assert session.draw(str(file), path.read_text())["plays"]["names"] == names
-    assert session.draw(str(path), path.read_text())["plays"]["script"]
+    assert session.draw(str(path), path.read_text())["plays"]["seats"][0]["script"]
     shy[0].begin(Room(), "script", "+hasty")
     shy[0].auto()
     with pytest.raises(RefusalError, match="has no script"):
@@ -348,3 +353,99 @@ def test_what_a_member_of_the_cast_sees_follows_the_episode(shy: tuple[Session, 
     for nobody in ("agent", "door", "nobody", ""):
         with pytest.raises(RefusalError, match="nobody called"):
             session.look(nobody)
+
+
+TOGETHER = SCENARIOS / "together"
+
+
+@pytest.fixture
+def levers(tmp_path: Path) -> Session:
+    """Two seats, each of which sees its own side of a wall."""
+    for name in ("levers_together", "levers_together_oracle"):
+        shutil.copy(TOGETHER / f"{name}.yaml", tmp_path)
+    path = tmp_path / "levers_together.yaml"
+    session = Session()
+    drawn = session.draw(str(path), path.read_text(), Room(seed=3))
+    seats = [{"seat": "agent", "script": True}, {"seat": "partner", "script": True}]
+    assert drawn["plays"]["seats"] == seats
+    assert drawn["episode"]["others"] == {"partner": "script"}
+    return session
+
+
+def test_a_person_on_another_seat_gets_what_that_seat_gets(levers: Session) -> None:
+    begun = levers.begin(Room(seed=3), seat="partner")["episode"]
+    assert begun["others"] == {"agent": "script"}
+    assert begun["trace"]["own"] == "partner"
+    beside = sd.make("together/levers_together+oracle", seats={"agent": "script"}).unwrapped
+    reads = TextView(beside.program, "grid")  # type: ignore[attr-defined]
+    observation, info = beside.reset(seed=3)
+    assert begun["seats"][0]["seen"] == reads.observe(observation, info)
+    for movement in ("forward", "right", "forward", "toggle"):
+        before, stepped = observation, levers.act(movement)
+        observation, reward, *_, info = beside.step(beside.encode_action((movement, None)))  # type: ignore[attr-defined]
+        last = LastStep(movement, before["image"])
+        assert stepped["seat"]["seen"] == reads.observe(observation, info, last)
+        agent, (partner,) = stepped["more"]["moments"][0], stepped["more"]["moments"][0]["seats"]
+        assert agent["action"] is not None, "the trace has what all have done"
+        assert (partner["did"], partner.get("reward", 0)) == (movement, reward)
+
+
+@pytest.mark.parametrize("who", ["script", "random", "nobody"])
+def test_the_other_seat_is_played_by_whom_one_chooses_also_after_steps_back(
+    levers: Session, who: str
+) -> None:
+    levers.begin(Room(seed=5), others={"partner": who})
+
+    def moments() -> list[dict[str, Any]]:
+        return [levers.act("forward")["more"]["moments"][0] for _ in range(6)]
+
+    first = moments()
+    done = [moment["seats"][0]["did"] for moment in first]
+    assert (set(done) == {"none"}) is (who == "nobody"), done
+    levers.back(0)
+    assert moments() == first
+    assert levers._playing()[1].tracer.trace().players == {"partner": who}
+
+
+def test_everybody_is_seen_as_the_engine_has_it_whoever_plays(levers: Session) -> None:
+    levers.begin(Room(seed=5), seat="partner", others={"agent": "random"})
+    for _ in range(5):
+        levers.act("right")
+        assert levers.look("partner")["cells"]  # asserts within that it has followed the episode
+
+
+def test_who_sits_where_outlives_a_change_of_the_text(levers: Session) -> None:
+    path = levers._file
+    levers.begin(Room(), seat="partner", others={"agent": "random"})
+    drawn = levers.draw(str(path), path.read_text() + "# a change\n")["episode"]
+    assert (drawn["trace"]["own"], drawn["others"]) == ("partner", {"agent": "random"})
+    alone = levers.draw(str(path), path.read_text().replace(", seat: open", ""))["episode"]
+    assert (alone["trace"].get("own", "agent"), alone["others"]) == ("agent", {})
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"seat": "bob"}, "there is no seat 'bob', only agent, partner"),
+        ({"others": {"bob": "random"}}, "got 'bob', expected one of agent, partner"),
+        ({"others": {"agent": "random"}}, "got another player for agent, whom me plays already"),
+        ({"others": {"partner": "shipped:nobody"}}, "no agent of this name ships"),
+    ],
+)
+def test_a_seating_that_cannot_be_leaves_the_game_as_it_was(
+    levers: Session, asked: dict[str, Any], said: str
+) -> None:
+    before = levers.act("forward")["more"]["moments"][0]["t"]
+    with pytest.raises(RefusalError, match=said):
+        levers.begin(Room(), **asked)
+    assert levers.act("left")["more"]["moments"][0]["t"] == before + 1
+
+
+def test_a_test_is_made_of_what_tests_can_play(levers: Session) -> None:
+    levers.act("left")
+    assert "do: left" in levers.write_test("turns")["text"]
+    for asked in ({"seat": "partner"}, {"others": {"partner": "random"}}):
+        levers.begin(Room(), **asked)  # type: ignore[arg-type]
+        levers.act("left")
+        with pytest.raises(RefusalError, match="a test plays the agent beside scripts"):
+            levers.write_test("turns")
