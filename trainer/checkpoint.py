@@ -65,11 +65,16 @@ class Checkpoint:
     """A checkpoint in memory: metadata, and tensors by dotted name.
 
     Names: `net.*`, `adam.*`, `state.*`, `step_scale`, `rng`, `envs`, and where there is one `curriculum`, `guide`,
-    `bonus.*`, `aux.*` with `aux_adam.*`, `algorithm.*`.
+    `bonus.*`, `aux.*` with `aux_adam.*`, `algorithm.*`, `partners.*`.
     """
 
     meta: CheckpointMeta
     tensors: dict[str, Tensor]
+
+    @property
+    def network(self) -> Checkpoint:
+        """The same without what only further training needs."""
+        return Checkpoint(self.meta, {n: value for n, value in self.tensors.items() if n.startswith("net.")})
 
     def part(self, prefix: str) -> dict[str, Tensor]:
         """The tensors under `prefix.`, without it."""

@@ -138,6 +138,12 @@ class _Starts(BaseModel):
     bonus_formula: Literal["as_coded", "as_printed"] = _option(
         "as_coded", "the bonus of the code that the paper's figures come from, or that of its text"
     )
+    seats: dict[str, list[Name]] = _option(
+        {},
+        "who plays members of the cast while the agent learns on the other seats, by member; several take turns from "
+        "game to game",
+        role="kept",
+    )
     recipe: Literal["plain", "guided", "paper"] = _option(
         "plain",
         "plain: PPO with the numbers above; guided: the script shows, then PPO; paper: PPO from the reward alone, as "
@@ -290,6 +296,16 @@ class RunConfig(_Options):
         return scenario_in(self._place, self.scenario)
 
     @property
+    def partners(self) -> dict[str, list[str]]:
+        """Who plays on which seats while the agent learns on the others, as they are found from here."""
+
+        def found(name: str) -> str:
+            kept = Path(name).parts[:1] == (PARTNERS_FOLDER,) and (self._place / name).is_file()
+            return str(self._place / name) if kept else name
+
+        return {seat: [found(name) for name in names] for seat, names in self.seats.items()}
+
+    @property
     def code_folder(self) -> Path:
         """Where `mine:Net` is looked for first: the folder of the scenario's file; for a name the run's folder."""
         if self._code is not None:
@@ -315,6 +331,9 @@ LEARNS: Final = "ppo"
 
 UNTRAINED: Final = ("random", "oracle", "human")
 """Agents without a network: chance, the scenario's script, a person."""
+
+PARTNERS_FOLDER: Final = "partners"
+"""Where a run keeps the networks that played with its agent."""
 
 SCENARIO_FOLDER: Final = "scenario"
 """Where a folder keeps the files of the scenario that it is about."""

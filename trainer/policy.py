@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -55,6 +58,26 @@ class NetPolicy:
             logits = logits + noise.to(logits.device)
         chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
         return chosen[0] if alone else chosen
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Memory, what its sight keeps, and the places of its random numbers, as arrays by name."""
+        memory: NDArray[Any] = self._memory.cpu().numpy().copy()
+        return {"memory": memory, "seen": self._seen.copy(), "streams": self._streams.state()}
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on where `state` was taken, to the bit.
+
+        Raises:
+            KeyError, ValueError: it is of another network.
+        """
+        if state["memory"].shape[1:] != tuple(self._memory.shape[1:]):
+            raise ValueError(
+                f"memory: got {state['memory'].shape}, expected (E, {tuple(self._memory.shape[1:])})"
+            )
+        self._memory = torch.from_numpy(state["memory"].copy()).to(self._memory)
+        self._seen = state["seen"].copy()
+        self._streams.load_state(state["streams"])
+        self._actor = None
 
     def thought(self) -> tuple[list[list[float]], float]:
         """What the agent made of the first room's last observation.

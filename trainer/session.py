@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +50,12 @@ _WORDS = ("actions", "templates", "nouns", "vocabulary")
 def _seats_of(envs: Any) -> int:
     """How many rows of a vector environment play one game."""
     return int(envs.num_envs) // int(getattr(envs, "num_games", envs.num_envs))
+
+
+def _partners_in(envs: Any) -> Mapping[str, Any]:
+    """The policies that fill other seats of a vector environment than those that learn."""
+    found: Mapping[str, Any] = getattr(envs, "partners", {})
+    return found
 
 
 @dataclass
@@ -185,6 +191,8 @@ class Session:
         for name, value in vars(self.state).items():
             tensors[f"state.{name}"] = torch.as_tensor(value)
         tensors["step_scale"] = torch.tensor(self.step_scale, dtype=torch.float64)
+        for name, partner in self._partners():
+            tensors |= _array_tensors(name, partner.state())
         tensors["rng"] = self.generator.get_state()
         tensors["envs"] = _as_tensor(self.envs.snapshot())
         meta = CheckpointMeta(
@@ -204,6 +212,10 @@ class Session:
     def modules(self) -> dict[str, nn.Module]:
         """What the optimizer trains, by the names under which a checkpoint has it: the network, an auxiliary loss."""
         return {"net": self.actor.net} | ({} if self.aux is None else {"aux": self.aux})
+
+    def _partners(self) -> list[tuple[str, Any]]:
+        """The policies on other seats, by the names that their states have in a checkpoint."""
+        return [(f"partners.{name}", policy) for name, policy in _partners_in(self.envs).items()]
 
     def _parts_in_json(self) -> list[tuple[str, Curriculum | Guide]]:
         """Curriculum and guide, if there are any, by the names that their states have in a checkpoint."""
@@ -246,6 +258,8 @@ class Session:
             if self.algorithm is not None:
                 self.algorithm.load_state(checkpoint.part("algorithm"))
             self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
+            for name, partner in self._partners():
+                partner.load_state({k: v.numpy() for k, v in checkpoint.part(name).items()})
             for name, part in self._parts_in_json():
                 part.load_state(json.loads(checkpoint.tensors[name].numpy().tobytes()))
             if self.tutor is not None:
@@ -348,6 +362,12 @@ def _check_form(config: RunConfig, envs: Any) -> None:
         raise ValueError(f"envs: got {type(envs).__name__}, {needed}")
     if envs.num_envs != config.envs:
         raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+    for name, partner in _partners_in(envs).items():
+        if not (hasattr(partner, "state") and hasattr(partner, "load_state")):
+            raise ValueError(
+                f"seats: {name} is a policy without `state` and `load_state`, so the run could not be resumed; "
+                "expected script, random or an agent of PPO"
+            )
     mode = envs.metadata.get("autoreset_mode")
     if mode != AutoresetMode.SAME_STEP:
         raise ValueError(f"envs: got the autoreset mode {getattr(mode, 'value', mode)}, {needed}")

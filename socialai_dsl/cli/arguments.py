@@ -80,7 +80,9 @@ def add_participant(parser: argparse.ArgumentParser, whose: str = "") -> None:
     )
 
 
-def add_seats(parser: argparse.ArgumentParser) -> None:
+def add_seats(
+    parser: argparse.ArgumentParser, more: str = "; the one who plays has the first seat that is left"
+) -> None:
     """Declare who sits on other seats than the one who plays."""
     parser.add_argument(
         "--seat",
@@ -88,8 +90,8 @@ def add_seats(parser: argparse.ArgumentParser) -> None:
         type=seat_and_player,
         default=[],
         metavar="NAME=PLAYER",
-        help="who plays a member of the cast with a seat: script, random, nobody, a run, a checkpoint or "
-        "shipped:NAME (repeatable); the one who plays has the first seat that is left",
+        help="who plays a member of the cast with a seat: script, random, nobody, a run, a checkpoint or shipped:NAME "
+        f"(repeatable){more}",
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from reprlib import repr as shortened
 from typing import Any, Literal
 
-from socialai_dsl.cli.arguments import add_declared, flag, typed_options, whole_number
+from socialai_dsl.cli.arguments import add_declared, add_seats, flag, typed_options, whole_number
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.options import AUTOMATIC
@@ -34,6 +34,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="the way of learning: guided (the scenario's script shows the task first), plain or paper (from "
         "the reward alone) (default: guided if the scenario has a script)",
     )
+    add_seats(
+        parser,
+        "; several for one seat take turns from game to game; the agent learns on all seats that are left",
+    )
     parser.add_argument(
         "--hyper",
         action="append",
@@ -45,7 +49,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def given_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """The options that were typed, by name."""
-    return typed_options(arguments, (*FLAGS, "recipe")) | _read_hyper(arguments.hyper)
+    options = typed_options(arguments, (*FLAGS, "recipe")) | _read_hyper(arguments.hyper)
+    seats: dict[str, list[str]] = {}
+    for seat, player in arguments.seat:
+        seats.setdefault(seat, []).append(player)
+    return options | ({"seats": seats} if seats else {})
 
 
 def _read_hyper(given: Sequence[str]) -> dict[str, Any]:

@@ -189,7 +189,12 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
         self._table = Table([program], 1, all_seats=seats is not None)
         seated = Seats.of("agent" if seats is None else seats, self._table.programs)
-        self._player = seated.own or 0
+        if len(seated.own) > 1:
+            several = ", ".join(seated.names[number] for number in seated.own)
+            raise ValueError(
+                f"seats: got {several} for the caller; expected one: a single environment takes one action"
+            )
+        self._player = seated.own[0]
         self._company = Company(seated, self._table) if seats is not None else None
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()

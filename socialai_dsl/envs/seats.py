@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -18,6 +18,8 @@ from socialai_dsl.program import Flag, Header, Program, Register
 SCRIPT: Final = "script"
 RANDOM: Final = "random"
 NOBODY: Final = "nobody"
+CALLER: Final = "caller"
+"""Whose actions are those of `step`; said where the caller has several seats and somebody else others."""
 
 Seating = str | Mapping[str, Any]
 """`agent`, `all`, or the seats that others than the caller fill, by member of the cast."""
@@ -60,22 +62,28 @@ class Seats:
 
     Attributes:
         names: all of them, the agent's first; with `agent` alone that one.
-        own: the number of the caller's; None: all are.
-        partners: who fills the others, by number: SCRIPT, RANDOM, NOBODY or a `Partner`.
+        own: the numbers of the caller's.
+        partners: who fills the others, by number: players that take turns from game to game, each SCRIPT, RANDOM,
+            NOBODY or a `Partner`.
     """
 
     names: tuple[str, ...]
-    own: int | None
-    partners: Mapping[int, Any]
+    own: tuple[int, ...]
+    partners: Mapping[int, tuple[Any, ...]]
 
     @property
-    def rows(self) -> slice:
-        """The caller's rows among those of all seats of all games."""
-        return (
-            slice(None)
-            if self.own is None or len(self.names) == 1
-            else slice(self.own, None, len(self.names))
-        )
+    def all_own(self) -> bool:
+        """Whether the caller has all of them."""
+        return len(self.own) == len(self.names)
+
+    def rows(self, games: int) -> slice | NDArray[np.intp]:
+        """The caller's rows among those of all seats of so many games."""
+        if self.all_own:
+            return slice(None)
+        if len(self.own) == 1:
+            return slice(self.own[0], None, len(self.names))
+        number = np.arange(games, dtype=np.intp)[:, None] * len(self.names)
+        return (number + np.array(self.own, np.intp)).reshape(-1)
 
     @classmethod
     def of(cls, seating: Seating, programs: Sequence[Program]) -> Seats:
@@ -86,23 +94,30 @@ class Seats:
         """
         if isinstance(seating, str) and seating in ("agent", "all"):
             names = tuple(map(str, programs[0].seats)) if seating == "all" else ("agent",)
-            return cls(names, None if seating == "all" else 0, {})
+            return cls(names, tuple(range(len(names))), {})
         if not isinstance(seating, Mapping):
             expected = "'agent', 'all', or a mapping from members of the cast to who fills their seats"
             raise ValueError(f"seats: got {seating!r}; expected {expected}")
         names = tuple(map(str, programs[0].seats))
-        for name, partner in seating.items():
+        filled = {}
+        for name, players in seating.items():
             require_seat(name, names)
-            _check_partner(str(name), partner, programs)
-        # Whoever is not named is the caller's, or if that is said of nobody in particular the agent is.
-        free = [name for name in names if name not in seating]
-        if not free:
-            raise ValueError(
-                f"seats: got {', '.join(names)} filled; expected one left for the actions of `step`"
-            )
-        own = 0 if names[0] in free else names.index(free[0])
-        partners = {number: seating.get(name, SCRIPT) for number, name in enumerate(names) if number != own}
+            filled[name] = _taking_turns(str(name), players)
+        own = _own_of(filled, names)
+        partners = {n: filled.get(name, (SCRIPT,)) for n, name in enumerate(names) if n not in own}
+        for number, players in partners.items():
+            for player in players:
+                _check_partner(names[number], player, programs)
         return cls(names, own, partners)
+
+
+def _own_of(filled: Mapping[str, tuple[Any, ...]], names: Sequence[str]) -> tuple[int, ...]:
+    """The caller's seats: those that are said to be, else the first that nobody fills. Raises ValueError for none."""
+    said = tuple(n for n, name in enumerate(names) if filled.get(name) == (CALLER,))
+    free = tuple(n for n, name in enumerate(names) if name not in filled)
+    if not said and not free:
+        raise ValueError(f"seats: got {', '.join(names)} filled; expected one left for the actions of `step`")
+    return said or free[:1]
 
 
 def require_seat(name: Any, names: Sequence[str]) -> None:
@@ -110,6 +125,15 @@ def require_seat(name: Any, names: Sequence[str]) -> None:
     if name not in names:
         near = suggested(str(name), names, quoted=repr)
         raise ValueError(f"seats: got {name!r}; expected one of {', '.join(names)}{near}")
+
+
+def _taking_turns(name: str, players: Any) -> tuple[Any, ...]:
+    """Those who fill a seat, as a tuple. Raises ValueError for a list of none."""
+    if not isinstance(players, list | tuple):
+        return (players,)
+    if not players:
+        raise ValueError(f"seats[{name!r}]: got an empty list; expected at least one player")
+    return tuple(players)
 
 
 def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None:
@@ -123,7 +147,7 @@ def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None
             "`reset` and `act`"
         )
     lacking = [p.name for p in programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
-    if name == "agent" and partner == SCRIPT and lacking:
+    if name == "agent" and _is(partner, SCRIPT) and lacking:
         raise ValueError(
             f"seats['agent']: got 'script', but the agent of {lacking[0]} follows no frame; expected 'random' or a "
             "policy, or the variant +oracle, if there is one"
@@ -131,53 +155,83 @@ def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None
 
 
 class Company:
-    """The partners of the caller in the games of a table: they act whenever the caller does."""
+    """The partners of the caller in the games of a table: they act whenever the caller does.
+
+    Of K players that take turns on a seat, number g modulo K has it in game g.
+
+    Raises:
+        ValueError: more players take turns than there are games.
+    """
 
     def __init__(self, seats: Seats, table: Table) -> None:
         self._seats, self._table = seats, table
-        self._partners = dict(seats.partners)
+        self._partners: dict[int, tuple[Any, ...]] = {}
         self._sizes = table.merged.action_space().nvec.astype(np.uint64)
         self._sites = [np.uint64(draws.site(f"seats.{name}")) for name in seats.names]
-        self._sit()
+        self._sit(dict(seats.partners))
+
+    @property
+    def policies(self) -> dict[str, Partner]:
+        """The partners that are policies, as `helper.0`: the seat, and their place among those that take turns."""
+        return {
+            f"{self._seats.names[number]}.{place}": player
+            for number, players in self._partners.items()
+            for place, player in enumerate(players)
+            if not isinstance(player, str)
+        }
 
     def seat(self, name: str, partner: Any) -> None:
         """Let somebody else than before fill a seat from the next step on. Raises ValueError as `Seats.of` does."""
         require_seat(name, self._seats.names)
         number = self._seats.names.index(name)
-        if number == self._seats.own:
+        if number in self._seats.own:
             raise ValueError(f"seats: got {name!r}, whose actions are those of `step`; expected another one")
-        _check_partner(name, partner, self._table.programs)
-        self._partners[number] = partner
-        self._sit()
+        players = _taking_turns(name, partner)
+        for player in players:
+            _check_partner(name, player, self._table.programs)
+        self._sit({**self._partners, number: players})
 
-    def _sit(self) -> None:
-        """Leave the seats on which scripts play by themselves; the agent's is always taken."""
-        scripted = [number for number, partner in self._partners.items() if number and _is(partner, SCRIPT)]
+    def _filled(self) -> Iterator[tuple[int, slice, Any]]:
+        """The number of each seat, the games of each player there, and the player."""
+        for number, players in self._partners.items():
+            for place, player in enumerate(players):
+                yield number, slice(place, None, len(players)), player
+
+    def _sit(self, partners: dict[int, tuple[Any, ...]]) -> None:
+        """Let these fill the seats, and leave those whose scripts play by themselves; the agent's is always taken."""
+        most = max(map(len, partners.values()), default=0)
+        if most > self._table.rows:
+            raise ValueError(
+                f"seats: got {most} players that take turns; expected at most {self._table.rows} games"
+            )
+        self._partners = partners
         taken = np.ones((self._table.rows, len(self._seats.names)), np.bool_)
-        taken[:, scripted] = False
+        for number, games, player in self._filled():
+            taken[games, number] = not number or not _is(player, SCRIPT)
         self._table.set_taken(taken.reshape(-1))
 
-    def begin(self, games: NDArray[np.bool_]) -> None:
+    def begin(self, begun: NDArray[np.bool_]) -> None:
         """Episodes have begun in some games, bool (E,)."""
-        for partner in self._partners.values():
-            if not isinstance(partner, str):
-                partner.reset(games)
+        for _, games, player in self._filled():
+            if not isinstance(player, str):
+                player.reset(begun[games])
 
     def act(self, own: NDArray[Any]) -> NDArray[np.int64]:
-        """The actions of all seats, int64 (E S, heads), where the caller's are `own`, (E, heads)."""
-        count, table = len(self._seats.names), self._table
+        """The actions of all seats, int64 (E S, heads), where the caller's are `own`, game by game."""
+        seats, table = self._seats, self._table
+        count = len(seats.names)
         actions = np.zeros((table.rows, count, len(self._sizes)), np.int64)
-        actions[:, self._seats.own] = own
-        for number, partner in self._partners.items():
-            if _is(partner, RANDOM):
-                actions[:, number] = self._drawn(number)
-            elif _is(partner, NOBODY):
-                actions[:, number, 0] = self._sizes[0] - np.uint64(1)  # no movement
-            elif not isinstance(partner, str):
-                image, tokens = table.image[number::count].copy(), table.tokens[number::count].copy()
-                actions[:, number] = partner.act({"image": image, "tokens": tokens})
-        if _is(self._partners.get(0), SCRIPT):
-            actions[:, 0] = table.scripted_actions()
+        actions[:, list(seats.own)] = own.reshape(table.rows, len(seats.own), -1)
+        for number, games, player in self._filled():
+            if _is(player, RANDOM):
+                actions[games, number] = self._drawn(number)[games]
+            elif _is(player, NOBODY):
+                actions[games, number, 0] = self._sizes[0] - np.uint64(1)  # no movement
+            elif _is(player, SCRIPT) and number == 0:
+                actions[games, 0] = table.scripted_actions()[games]
+            elif not isinstance(player, str):
+                image, tokens = table.image[number::count][games], table.tokens[number::count][games]
+                actions[games, number] = player.act({"image": image.copy(), "tokens": tokens.copy()})
         return actions.reshape(table.players, -1)
 
     def _drawn(self, number: int) -> NDArray[np.int64]:

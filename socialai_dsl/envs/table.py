@@ -428,11 +428,6 @@ class Table(Copied):
             )
         return actions
 
-    def scripts_of_all(self) -> NDArray[np.int64]:
-        """The actions of the scripts on all seats, int64 (E S, 3 + slots); nothing changes in the rooms."""
-        found = [self.scripts_of(seat) for seat in range(self.seats)]
-        return np.stack(found, axis=1).reshape(self.players, -1)
-
     def scripts_of(self, seat: int) -> NDArray[np.int64]:
         """The actions of the script on one seat, int64 (E, 3 + slots); nothing changes in the rooms."""
         if seat == 0:

@@ -16,7 +16,7 @@ from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import frame
-from socialai_dsl.envs.seats import Company, Seating, Seats
+from socialai_dsl.envs.seats import Company, Partner, Seating, Seats
 from socialai_dsl.envs.table import HeardLines, Table, joined
 from socialai_dsl.envs.values import whole_number
 from socialai_dsl.program import Program
@@ -71,8 +71,9 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             are E = `num_envs` S rows with an observation, an action, a reward and a success each; `seat` says which.
             An episode begins and ends in all rows of a game at once; seeds and options of `reset` are those of games.
             A mapping, `{"helper": "script"}`: who fills the seats of members of the cast: `script`, its frame (a
-            member without one stays); `random`; or a policy with `reset(mask)` and `act(observation)`. Actions are
-            those of the first seat that it does not name, and all others follow their frames.
+            member without one stays); `random`; a policy with `reset(mask)` and `act(observation)`; or a list of K of
+            these, of which number g modulo K sits there in game g. Actions are those of the seats that it gives to
+            `caller`, or if there is none, of the first one that it does not name; all others follow their frames.
 
     Attributes:
         seat: int64 (E,), the number of the seat that a row plays, 0 the agent's.
@@ -121,11 +122,12 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         self._task = _TASKS[self.autoreset_mode]
         self._table = Table(playables, int(num_envs), all_seats=not _is_agents(seats))
         self._seats = Seats.of(seats, self._table.programs)
-        self._own = self._seats.rows
+        self._own = self._seats.rows(self._table.rows)
         self._company = Company(self._seats, self._table) if self._seats.partners else None
         self._copy = copy
         self.num_games = int(num_envs)
-        self.seat = (np.arange(self._table.players) % self._table.seats)[self._own]
+        self._players = np.arange(self._table.players)[self._own].tolist()
+        self.seat = np.array(self._players) % self._table.seats
         self.num_envs = len(self.seat)
         self.render_mode = check_render_mode(render_mode, self.metadata["render_modes"])
         self.single_observation_space = self._table.merged.observation_space()
@@ -224,13 +226,13 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
 
     def _given(self, of_players: NDArray[Any]) -> NDArray[Any]:
         """What belongs to the caller of what each player has."""
-        own = of_players if self._own == slice(None) else of_players[self._own]
+        own = of_players if self._seats.all_own else of_players[self._own]
         return own.copy() if self._copy else own
 
     def _for_players(self, of_games: NDArray[Any]) -> NDArray[Any]:
         """What is so in each game, for each row."""
-        if self._seats.own is None:
-            return np.repeat(of_games, self._table.seats)
+        if len(self._seats.own) > 1:
+            return np.repeat(of_games, len(self._seats.own))
         return of_games.copy() if self._copy else of_games
 
     def _infos(self) -> dict[str, Any]:
@@ -261,11 +263,6 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
     def histories(self) -> list[str]:
         """What each environment's agent heard since the reset: the lines that the token buffer still holds."""
         return ["\n".join(self._table.history(player)) for player in self._players]
-
-    @property
-    def _players(self) -> range:
-        """The caller's, by number."""
-        return range(self._table.players)[self._own]
 
     def members(self) -> list[str | None]:
         """The name of the suite's member that each environment plays in this episode; None without a suite."""
@@ -302,9 +299,9 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         Raises:
             ValueError: it is something else, or not all seats are the caller's.
         """
-        if self._seats.own is not None:
+        if self._company is not None or len(self._seats.names) == 1:
             raise ValueError(
-                f"set_taken: got a call for {self._seats.names[self._seats.own]} alone; expected seats='all'"
+                f"set_taken: got a call for {', '.join(self.seat_names)} alone; expected seats='all'"
             )
         self._table.set_taken(taken)
 
@@ -341,8 +338,12 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
     @property
     def seat_names(self) -> tuple[str, ...]:
         """The members of the cast that the caller plays, in the order of the rows of a game."""
-        names = self._seats.names
-        return names if self._seats.own is None else (names[self._seats.own],)
+        return tuple(self._seats.names[number] for number in self._seats.own)
+
+    @property
+    def partners(self) -> dict[str, Partner]:
+        """The policies on other seats than the caller's, as `helper.0`: the seat, and their place in its list."""
+        return {} if self._company is None else self._company.policies
 
     def scripted_actions(self, seat: str | None = None) -> NDArray[np.int64]:
         """The actions of the scenario's own scripts for the members that are played, int64 (E, 3 + slots).
@@ -356,11 +357,11 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         Raises:
             ValueError: one of the members follows no frame.
         """
-        if seat == AGENT or (seat is None and self._seats.own == 0):
-            return self._table.scripted_actions()
-        if seat is not None:
+        if seat not in (AGENT, None):
             raise ValueError(f"seat: got {seat!r}; expected {AGENT!r} or none")
-        return self._table.scripts_of_all()[self._own]
+        played = (0,) if seat == AGENT else self._seats.own
+        found = [self._table.scripts_of(number) for number in played]
+        return np.stack(found, axis=1).reshape(-1, found[0].shape[-1])
 
     def counters(self) -> dict[str, Any]:
         """Counts since the environments were made.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import compiled, make, make_vec
-from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
+from socialai_dsl.envs.seats import CALLER, NOBODY, RANDOM, SCRIPT
 from socialai_dsl.episodes.play import AGENT, Seat
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
@@ -28,6 +29,8 @@ Partners = Mapping[Seat, Player]
 """Who plays on seats that the one in question does not play."""
 
 _SEAT = "seat"
+_WORDS = {SCRIPT: "oracle", NOBODY: NOBODY}
+"""What is said of a seat alone -> the player that it means."""
 
 
 def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, Player]:
@@ -42,19 +45,57 @@ def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playa
     Raises:
         UsageError: a seat does not exist or has two players, a player is unknown, or no seat is left.
     """
+    found = pools_of(named, scenario, program)
+    for seat, players in found.items():
+        if len(players) > 1:
+            raise OptionError(_SEAT, f"got {len(players)} players for {seat}, expected one")
+    return {seat: players[0] for seat, players in found.items()}
+
+
+def pools_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, list[Player]]:
+    """`partners_of`, with several players that take turns on a seat; a path with `*` is all that it matches."""
     seats = seats_of(program)
-    found: dict[Seat, Player] = {}
+    found: dict[Seat, list[Player]] = {}
     for seat, name in named:
         if seat not in seats:
             near = suggested(seat, seats, quoted=repr)
             raise OptionError(_SEAT, f"got {seat!r}, expected one of {', '.join(seats)}{near}")
-        if seat in found:
-            raise OptionError(_SEAT, f"got two players for {seat}, expected one")
-        words = {SCRIPT: "oracle", NOBODY: NOBODY}
-        found[seat] = Player(words[name] if name in words else named_agent(name, scenario))
+        for one in _matches(name):
+            player = Player(_WORDS[one] if one in _WORDS else named_agent(one, scenario))
+            found.setdefault(seat, []).append(player)
     if len(found) == len(seats):
         raise OptionError(_SEAT, f"got a player for {', '.join(seats)}, expected one seat left for who plays")
     return found
+
+
+def _matches(name: str) -> list[str]:
+    """The paths that a pattern stands for. Raises UsageError where there is none."""
+    found = sorted(glob(name)) if "*" in name else [name]
+    if not found:
+        raise OptionError(_SEAT, f"got {name!r}, which matches no file or folder")
+    return found
+
+
+def seats_with(pools: Mapping[Seat, Sequence[Player]], program: Playable) -> dict[Seat, Any]:
+    """What `make_vec` takes by `seats` where these players take turns on theirs, and the caller has the other seats.
+
+    Raises:
+        UsageError: a player has no script, does not fit, or is none that can be asked here.
+    """
+    env = make(program)
+    try:
+        filled: dict[Seat, Any] = {
+            seat: [
+                _filling(replace(player, seed=player.seed + (place << 32)), seat, program, env)
+                for place, player in enumerate(players)
+            ]
+            for seat, players in pools.items()
+        }
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    finally:
+        env.close()
+    return {seat: filled.get(seat, CALLER) for seat in seats_of(program)}
 
 
 def own_seat(partners: Partners, program: Playable) -> Seat:
@@ -111,7 +152,7 @@ def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | P
 
 def _seated(player: Player, number: int, envs: Any) -> tuple[Policy, list[str]]:
     """What plays a seat; what one draws must not tell another anything, so each seat has a seed of its own."""
-    return make_policy(replace(player, seed=player.seed + (number << 40)), envs)
+    return make_policy(replace(player, seed=(player.seed + (number << 40)) % (1 << 63)), envs)
 
 
 @dataclass(frozen=True, eq=False)

@@ -222,6 +222,18 @@ class Streams:
         self._require(count)
         return np.stack([stream.gumbel(size=width) for stream in self._streams]).astype(np.float32)
 
+    def state(self) -> Int64:
+        """Where all streams are, int64 (E, 13)."""
+        return (
+            np.array([_place_in(stream) for stream in self._streams], np.uint64)
+            .reshape(-1, 13)
+            .view(np.int64)
+        )
+
+    def load_state(self, state: Int64) -> None:
+        """Go on from there, with as many environments."""
+        self._streams = [_stream_at(place) for place in np.ascontiguousarray(state).view(np.uint64)]
+
     def _require(self, count: int) -> None:
         """Make the streams of `count` environments, if there are others or none."""
         if len(self._streams) != count:
@@ -231,3 +243,27 @@ class Streams:
 def _stream(seed: int, number: int) -> np.random.Generator:
     """Philox, whose streams of different keys are independent (Salmon et al. 2011)."""
     return np.random.Generator(np.random.Philox(key=np.array([seed, number], np.uint64)))
+
+
+def _place_in(stream: np.random.Generator) -> list[int]:
+    """Where a stream is: counter, key, and what is left of the last block, 13 words."""
+    state: Any = stream.bit_generator.state
+    words = [*state["state"]["counter"], *state["state"]["key"], *state["buffer"]]
+    return [*map(int, words), *(int(state[name]) for name in ("buffer_pos", "has_uint32", "uinteger"))]
+
+
+def _stream_at(words: NDArray[np.uint64]) -> np.random.Generator:
+    """The stream that is where `_place_in` says. Raises ValueError for what is no such place."""
+    position, has_half, half = map(int, words[10:])
+    if position > 4 or has_half > 1 or half >> 32:  # NumPy does not look
+        raise ValueError(f"streams: got the place {words.tolist()}, expected that of a stream")
+    bits = np.random.Philox()
+    bits.state = {
+        "bit_generator": "Philox",
+        "state": {"counter": words[:4].copy(), "key": words[4:6].copy()},
+        "buffer": words[6:10].copy(),
+        "buffer_pos": position,
+        "has_uint32": has_half,
+        "uinteger": half,
+    }
+    return np.random.Generator(bits)

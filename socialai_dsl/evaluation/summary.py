@@ -13,7 +13,7 @@ Row = tuple[str, str]
 
 
 def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
-    """Success with its interval, also of each member of a suite and value of a draw, then mean length and return."""
+    """Success with its interval, in all and in parts, such as seats and members of a suite; then length and return."""
     manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
         ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} (Wilson)"),
@@ -38,6 +38,10 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     rows[1:1] = [
         (f"  of {seat}", f"{found['success_rate']:.1%}, {_interval(found)}")
         for seat, found in figures.get("seats", {}).items()
+    ]
+    rows[1:1] = [
+        (f"  with {partner}", f"{found['success_rate']:.1%}, {_interval(found)}")
+        for partner, found in figures.get("with", {}).items()
     ]
     if "invalid_rate" in figures:
         rows += _model_rows(figures)

@@ -10,13 +10,16 @@ from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
+from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
 from socialai_dsl.episodes.scripts import script_of
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
 from socialai_dsl.runs.folder import SCENARIO
-from trainer.config import RunConfig, scenario_in
+from trainer.config import PARTNERS_FOLDER, RunConfig, scenario_in
+from trainer.files import CHECKPOINTS, SUFFIX
+from trainer.shipped import PREFIX
 
 
 def keep_scenario(folder: Path, spec: str, loaded: Loaded) -> "MovedScenario":
@@ -61,7 +64,7 @@ def keep_run(folder: Path, config: RunConfig, loaded: Loaded) -> RunConfig:
         UsageError, OSError: something cannot be copied.
     """
     kept = config.model_copy(update={"scenario": keep_scenario(folder, config.scenario, loaded).scenario})
-    kept = kept.within(folder)
+    kept = kept.model_copy(update={"seats": _keep_partners(folder, config.seats)}).within(folder)
     phases = Path(config.curriculum)
     beside = phases.parent.resolve() == config.code_folder.resolve()
     own = bool(config.own_classes)
@@ -73,6 +76,38 @@ def keep_run(folder: Path, config: RunConfig, loaded: Loaded) -> RunConfig:
     if config.own_files:
         _copy_code(config.code_folder, kept.code_folder)
     return kept.within(folder, config.code_folder) if own else kept
+
+
+def _keep_partners(folder: Path, seats: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Copy the networks that play on other seats. Returns how all players there are called in the folder."""
+
+    def kept(seat: str, place: int, name: str) -> str:
+        if name in (SCRIPT, RANDOM, NOBODY) or name.startswith(PREFIX):
+            return name
+        from trainer import checkpoint as checkpoints
+        from trainer.errors import CheckpointError
+
+        try:
+            network = checkpoints.read_agent(name).network
+        except CheckpointError as error:
+            raise OptionError("seat", str(error)) from None
+        file = Path(PARTNERS_FOLDER, f"{seat}-{place}-{_label(Path(name))}{SUFFIX}")
+        (folder / file).parent.mkdir(exist_ok=True)
+        checkpoints.write_file(folder / file, network)
+        return file.as_posix()
+
+    return {
+        seat: [kept(seat, place, name) for place, name in enumerate(names)] for seat, names in seats.items()
+    }
+
+
+def _label(agent: Path) -> str:
+    """What tells an agent from others: the name of its folder, of one checkpoint that of its run with the frames."""
+    whole = agent.resolve()
+    if whole.suffix != SUFFIX:
+        return whole.name
+    run = whole.parent.parent if whole.parent.name == CHECKPOINTS else whole.parent
+    return f"{run.name}-{whole.stem.lstrip('0') or '0'}"
 
 
 def _copy_code(folder: Path, there: Path) -> None:

@@ -83,9 +83,7 @@ def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
         raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
     loaded = load(config.played)
     try:
-        whole = checkpoints.read_agent(run)
-        weights = {name: value for name, value in whole.tensors.items() if name.startswith("net.")}
-        return config, loaded, checkpoints.Checkpoint(whole.meta, weights)
+        return config, loaded, checkpoints.read_agent(run).network
     except CheckpointError as error:
         raise UsageError(str(error)) from error
 

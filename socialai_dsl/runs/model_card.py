@@ -14,7 +14,16 @@ from trainer.shipped import PREFIX
 # Options that change where and how a run is made, not what it learns.
 _NOT_REPEATED: Final = ("agent", "device", "eval_episodes", "wandb", "checkpoint_every", "keep_checkpoints")
 # Options with a row of their own in the card, or that say nothing about the agent.
-_NOT_HYPER: Final = {"scenario", "agent", "seed", "device", "threads", "eval_episodes", *WITHOUT_EFFECT}
+_NOT_HYPER: Final = {
+    "scenario",
+    "agent",
+    "seed",
+    "device",
+    "threads",
+    "eval_episodes",
+    "seats",
+    *WITHOUT_EFFECT,
+}
 
 
 def model_card(
@@ -56,7 +65,7 @@ def model_card(
             ],
         ),
         "## Limits",
-        _LIMITS,
+        _LIMITS.format(partners=_partners_tested(config, result["eval"])),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -73,8 +82,22 @@ _LIMITS: Final = """\
 * One agent, trained with one seed. The interval says how exactly its own success rate is known, not how other seeds do.
 * It was trained and tested on rooms drawn from this one program. Elsewhere it plays only where actions, utterances and
   pictures have the same sizes, and words it never met mean nothing to it.
-* Its partners are scripted. Success says something about the scenario's rules, and nothing about people.
+* {partners}
 * Its figures hold for the way of choosing actions that is named above."""
+
+
+def _partners_tested(config: RunConfig, evaluation: Mapping[str, Any]) -> str:
+    """What its partners were, and so what its success says nothing about."""
+    if config.seats:
+        return (
+            "It was trained and tested with the partners named above. What it does with others is not known."
+        )
+    if "seats" in evaluation:
+        return (
+            "It was trained and tested with itself on the other seats. What it does with other partners, "
+            "`socialai crossplay` tells."
+        )
+    return "Its partners are scripted. Success says something about the scenario's rules, and nothing about people."
 
 
 def _front_matter(name: str, config: RunConfig, result: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,6 +149,9 @@ def _facts(config: RunConfig, result: Mapping[str, Any], weights: str) -> list[t
         ("weights", f"`{weights}`" + _precision(result.get("half_precision"))),
         ("frames", f"{result['frames']:,}"),
         ("seed", str(config.seed)),
+    ]
+    rows += [
+        (f"on the seat {seat}", ", ".join(f"`{n}`" for n in names)) for seat, names in config.seats.items()
     ]
     if "train_seconds" in result:
         rows.append(("time", f"{result['train_seconds']:.0f} s on `{config.device}`"))
@@ -189,11 +215,15 @@ def _command(config: RunConfig) -> str:
     hyper = {
         name: value
         for name, value in asked.items()
-        if name not in FLAGS and name not in ("scenario", "recipe")
+        if name not in FLAGS and name not in ("scenario", "recipe", "seats")
     }
     given = {"recipe": config.recipe, **flags, "hyper": hyper}
+    partners = [f"--seat {seat}={name}" for seat, names in config.seats.items() for name in names]
     return " ".join(
-        ["socialai-run", config.scenario, *(w for name, value in given.items() for w in _typed(name, value))]
+        [
+            *("socialai-run", config.scenario, *partners),
+            *(word for name, value in given.items() for word in _typed(name, value)),
+        ]
     )
 
 

@@ -27,7 +27,7 @@ AUTOMATIC: Final[Mapping[str, str]] = {
 }
 """Options without one default -> what stands in its place, in words."""
 
-OPTIONS: Final = (*FLAGS, *HYPER, "recipe")
+OPTIONS: Final = (*FLAGS, *HYPER, "recipe", "seats")
 """The names of all options that a user may give."""
 
 _OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net", "algorithm")
@@ -63,6 +63,8 @@ def new_config(scenario: str, options: Mapping[str, Any], loaded: Loaded) -> Run
     """
     _refuse_unknown(options)
     given = {**options, "scenario": scenario}
+    if "seats" in given:
+        given["seats"] = _lists_of_players(given["seats"])
     given["device"] = resolved_device(given.get("device", "auto"))
     if given.get("agent", "ppo") != "ppo":
         _refuse_training_options(options)
@@ -191,13 +193,33 @@ def _refuse_unknown(options: Mapping[str, Any]) -> None:
         if name not in OPTIONS:
             hint = suggested(name, OPTIONS, f"; expected one of {', '.join(OPTIONS)}")
             raise OptionError(name, f"there is no such option{hint}")
-        if not isinstance(value, bool | int | float | str | None):
+        if name != "seats" and not isinstance(value, bool | int | float | str | None):
             raise OptionError(
                 name, f"got {shortened(value)}, expected a number, a word, a truth value or nothing"
             )
     recipe = options.get("recipe")
     if recipe is not None and recipe not in RECIPES:
         raise OptionError("recipe", f"got {recipe!r}, expected one of {', '.join(RECIPES)}")
+
+
+def _lists_of_players(given: Any) -> dict[str, list[str]]:
+    """The players of each seat, which may be one or several. Raises OptionError for what is none."""
+    if not isinstance(given, Mapping):
+        raise OptionError("seat", f"got {shortened(given)}, expected players by member of the cast")
+    found = {}
+    for seat, players in given.items():
+        names = [players] if isinstance(players, str) else players
+        if not isinstance(seat, str) or not _is_list_of_words(names):
+            raise OptionError(
+                "seat",
+                f"got {shortened(players)} for {shortened(seat)}, expected the name of a player, or several",
+            )
+        found[seat] = list(names)
+    return found
+
+
+def _is_list_of_words(names: Any) -> bool:
+    return isinstance(names, list | tuple) and bool(names) and all(isinstance(n, str) and n for n in names)
 
 
 def _refuse_idle(given: Iterable[str], config: RunConfig) -> None:

@@ -7,7 +7,7 @@ import shutil
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import harmonic_mean
@@ -17,7 +17,10 @@ from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled, make_vec
+from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
+from socialai_dsl.episodes.partners import pools_of, seats_with
+from socialai_dsl.episodes.play import AGENT, Seat
 from socialai_dsl.episodes.players import Player, folder_of, named_agent, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, RunFailed, UsageError
@@ -49,6 +52,7 @@ if TYPE_CHECKING:
     from socialai_dsl.runs.tracking import WandbTracker
 
 _REMEMBERED_UPDATES: Final = 20
+_TOLD_OF_PARTNERS: Final = ("episodes", "success_rate", "success_interval")
 _AGENTS: Final = ("ppo", *UNTRAINED)
 
 
@@ -126,6 +130,8 @@ def train(
         progress: called before training and after each update; nothing is printed.
         options: of `trainer.config.RunConfig`, such as `frames=100_000`, `seed=1`, `net="paper"` or `lr=1e-4`; those
             that are left out, `frames`, `recipe`, `device` and `threads` among them, follow from scenario and machine.
+            `seats={"helper": ["script", "runs/x"]}` names players that take turns on a seat from game to game; they
+            stay as they are, and the agent learns on the seats that are left.
             With `agent="random"`, `"oracle"` or the path of a trained agent nothing is trained: that agent is tested.
 
     Raises:
@@ -142,8 +148,8 @@ def train(
         known = ", ".join(_AGENTS)
         raise OptionError("agent", f"expected {known}, shipped or the path of a checkpoint, got {agent!r}")
     loaded = load(spec)
-    config = new_config(spec, {**options, "agent": agent}, loaded)
     program = compiled(loaded)
+    config = _with_partners(new_config(spec, {**options, "agent": agent}, loaded), program)
     with new_run_folder(None if out is None else Path(out), config.scenario, config.seed) as folder:
         before = set(folder.iterdir())
         copied: set[Path] = set()
@@ -182,6 +188,49 @@ def resume(folder: str | Path, *, progress: Report | None = None, **options: Any
         return _perform(run, config, loaded, compiled(loaded), True, progress)
 
 
+def _with_partners(config: RunConfig, program: Playable) -> RunConfig:
+    """The configuration in which players on other seats are called as they are found from anywhere.
+
+    Raises:
+        UsageError: a seat does not exist, a player is unknown, or none is left that learns.
+    """
+    pools = _pools(config, program)
+    for seat, players in pools.items():
+        for player in players:
+            if player.is_model or player.is_person:
+                raise OptionError(
+                    "seat", f"got {player.agent!r} for {seat}, expected script, random or a trained agent"
+                )
+    called = {
+        seat: [SCRIPT if player.is_script else player.agent for player in players]
+        for seat, players in pools.items()
+    }
+    return config.model_copy(update={"seats": called})
+
+
+def _pools(config: RunConfig, program: Playable) -> dict[Seat, list[Player]]:
+    """Who takes turns on which seats while the agent learns on the others. Raises UsageError as `pools_of` does."""
+    named = [(seat, name) for seat, names in config.partners.items() for name in names]
+    pools = pools_of(named, config.scenario, program) if named else {}
+    return {
+        seat: [_player(player.agent, config, config.seed) for player in players]
+        for seat, players in pools.items()
+    }
+
+
+def _player(agent: str, config: RunConfig, seed: int, out: Path | None = None) -> Player:
+    """Somebody who plays in a run, with the code of one's own that the run may load."""
+    return Player(
+        agent,
+        config.device,
+        seed=seed,
+        net=config.net,
+        algorithm=config.algorithm,
+        folder=config.code_folder,
+        out=out,
+    )
+
+
 def _resumable(run: Run) -> RunConfig:
     try:
         config = run.config
@@ -208,23 +257,19 @@ def _perform(
         agent = str(_train(run, config, loaded, program, resumed, report))
         training = training_figures(folder)
     # What is trained differs by its training; what is not, by what it draws.
-    drawn = 0 if config.trains else config.seed
-    player = Player(
-        agent,
-        config.device,
-        seed=drawn,
-        net=config.net,
-        algorithm=config.algorithm,
-        folder=config.code_folder,
-        out=folder,
-    )
-    played = play_test_set(player, config.played, loaded, program, config.eval_episodes)
+    player = _player(agent, config, 0 if config.trains else config.seed, folder)
+    pools = _pools(config, program)
+    asked = player, config.played, loaded, program, config.eval_episodes
+    played = play_test_set(*asked, partners={seat: players[0] for seat, players in pools.items()})
     evaluation = replace(played, folder=folder, kept=config.scenario)
     for warning in evaluation.warnings:
         warnings.warn(warning, stacklevel=3)
     told = {"recipe": config.recipe, "guide": config.guide} if config.trains else {}
     result = result_of(evaluation, **told, **training)
     result |= {"agent": short_name(config.player), "seed": config.seed}  # of the training, if there was one
+    if pools:
+        result["partners"] = {seat: names[0] for seat, names in config.seats.items()}
+        result["eval"]["with"] = dict(_with_each(asked, pools, config.seats))
     record_run(evaluation, folder, f"agent {short_name(config.player)}, seed {config.seed}")
     if config.trains:
         draw_curve(config, folder, result)
@@ -248,7 +293,7 @@ def _train(
 
     played = _played(config, loaded)
     scenario = program if played is loaded else compiled(played)
-    envs = _environments(scenario, config)
+    envs = _environments(scenario, config, _pools(config, program))
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
 
@@ -276,28 +321,47 @@ def _train(
         envs.close()
 
 
-def _environments(scenario: Playable, config: RunConfig) -> ScenarioVectorEnv:
-    """As many rows as the run asks for; where several seats can be played, each game has a row for each of them.
+def _with_each(
+    asked: tuple[Player, str, Loaded, Playable, int],
+    pools: Mapping[Seat, Sequence[Player]],
+    called: Mapping[Seat, Sequence[str]],
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What came of the test set with each further player of a seat, by `SEAT=PLAYER`; on other seats are the first."""
+    for seat, players in pools.items():
+        for player, name in zip(players[1:], called[seat][1:], strict=True):
+            sitting = {other: few[0] for other, few in pools.items()} | {seat: player}
+            figures = play_test_set(*asked, partners=sitting).figures()
+            yield f"{seat}={name}", {key: figures[key] for key in _TOLD_OF_PARTNERS}
+
+
+def _environments(
+    scenario: Playable, config: RunConfig, pools: Mapping[Seat, Sequence[Player]]
+) -> ScenarioVectorEnv:
+    """As many rows as the run asks for; each game has a row for each seat on which the agent learns.
 
     Raises:
-        UsageError: the rows cannot be shared out among the games.
+        UsageError: the rows cannot be shared out among the games, or a player does not fit.
     """
     seats = seats_of(scenario)
-    if config.envs % len(seats):
+    own = [seat for seat in seats if seat not in pools]
+    if config.envs % len(own):
         raise OptionError(
-            "envs", f"got {config.envs}, expected a multiple of the {len(seats)} seats: {', '.join(seats)}"
+            "envs", f"got {config.envs}, expected a multiple of the {len(own)} seats: {', '.join(own)}"
         )
-    return make_vec(
-        scenario,
-        num_envs=config.envs // len(seats),
-        copy=False,
-        autoreset_mode="SameStep",
-        seats="all" if len(seats) > 1 else "agent",
-    )
+    games = config.envs // len(own)
+    most = max(map(len, pools.values()), default=0)
+    if most > games:
+        raise OptionError(
+            "seat", f"got {most} players that take turns, expected at most {games}, one for each game"
+        )
+    seating = seats_with(pools, scenario) if pools else "all" if len(seats) > 1 else AGENT
+    return make_vec(scenario, num_envs=games, copy=False, autoreset_mode="SameStep", seats=seating)
 
 
 def _played(config: RunConfig, loaded: Loaded) -> Loaded:
-    """What is played while training: where a guide leads, the variant with the script that it may follow."""
+    """What is played while training: where a script plays the agent or a guide leads, the variant with that script."""
+    if SCRIPT in config.seats.get(AGENT, ()):
+        return with_script(config.played, loaded).loaded
     if config.guide == "none":
         return loaded
     if config.guide == "script":

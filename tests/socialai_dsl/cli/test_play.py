@@ -528,7 +528,7 @@ def test_another_seat_is_played_and_the_journal_is_replayed_to_the_same_bits(
     ("words", "said"),
     [
         (["--seat", "jil=random"], "expected one of agent, jill; did you mean 'jill'"),
-        (["--seat", "jill=random", "--seat", "jill=script"], "got two players for jill, expected one"),
+        (["--seat", "jill=random", "--seat", "jill=script"], "got 2 players for jill, expected one"),
         (["--seat", "jill=random", "--seat", "agent=random"], "expected one seat left"),
         (["--seat", "jill"], "expected NAME=PLAYER"),
         (["--seat", "jill=runs/nowhere"], "runs/nowhere"),

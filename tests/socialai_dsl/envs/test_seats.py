@@ -158,6 +158,54 @@ def test_one_plays_another_member(two: str) -> None:
     assert env.unwrapped.explain()["fired"], "the step is played again with all players"
 
 
+def test_players_take_turns_from_game_to_game(two: str) -> None:
+    """Of K players number g modulo K plays in game g, and meets nobody else's games."""
+    single = sd.make(two).unwrapped
+    one, other = (Greeter(single.encode_action((None, f"Say {word}"))) for word in ("hello", "bye"))
+    envs = sd.make_vec(two, 7, seats={"bob": [one, "script", other]}, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    assert (one.begun, other.begun) == (3, 2)
+    assert envs.partners == {"bob.0": one, "bob.2": other}
+    still = np.tile([7, 0, 0, 0], (7, 1))
+    *_, terminated, _, _ = envs.step(still)
+    assert np.flatnonzero(terminated).tolist() == [2, 5], (
+        "his own word ends the episode with a success for him"
+    )
+    assert (one.begun, other.begun) == (3, 4)
+    assert [envs.utterances()[game] for game in (0, 1, 3, 4, 6)] == ["Bob: Say hello"] * 5
+    with pytest.raises(ValueError, match="got 3 players that take turns; expected at most 2 games"):
+        sd.make_vec(two, 2, seats={"bob": [one, "script", other]})
+
+
+def test_the_caller_may_have_several_seats_beside_partners(tmp_path: Path) -> None:
+    """The rows are those of all seats, without the partner's."""
+    name = "together/commons_together"
+    whole = sd.make_vec(name, 3, seats="all", autoreset_mode="SameStep")
+    own = sd.make_vec(
+        name, 3, seats={"agent": "caller", "cat": "caller", "bob": "script"}, autoreset_mode="SameStep"
+    )
+    kept = whole.seat != 1
+    whole.set_taken(kept)
+    assert own.seat_names == ("agent", "cat")
+    assert own.seat.tolist() == whole.seat[kept].tolist() == [0, 2] * 3
+    first, second = whole.reset(seed=3)[0], own.reset(seed=3)[0]
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        for key, value in second.items():
+            np.testing.assert_array_equal(value, first[key][kept])
+        played = rng.integers(0, whole.single_action_space.nvec, (9, len(whole.single_action_space.nvec)))
+        first, *theirs, infos = whole.step(played)
+        second, *mine, own_infos = own.step(played[kept])
+        for one, other in zip(theirs, mine, strict=True):
+            np.testing.assert_array_equal(one[kept], other)
+        assert infos.keys() == own_infos.keys()
+        assert own.histories() == [
+            text for text, is_own in zip(whole.histories(), kept, strict=True) if is_own
+        ]
+    with pytest.raises(ValueError, match="got agent, cat for the caller; expected one"):
+        sd.make(name, seats={"agent": "caller", "cat": "caller"})
+
+
 @pytest.mark.parametrize(
     ("seats", "message"),
     [
@@ -166,6 +214,9 @@ def test_one_plays_another_member(two: str) -> None:
         ({"bob": "scirpt"}, "expected 'script', 'random', 'nobody' or a policy"),
         ({"bob": 3}, "a policy with `reset` and `act`"),
         ({"agent": "script"}, "the agent of two follows no frame"),
+        ({"bob": "caller"}, "the agent of two follows no frame"),
+        ({"bob": []}, "expected at least one player"),
+        ({"bob": ["caller", "random"]}, "expected 'script', 'random', 'nobody' or a policy"),
         ({"agent": "random", "bob": "random"}, "expected one left for the actions of `step`"),
     ],
 )

@@ -72,7 +72,7 @@ def test_one_who_plays_alone_meets_the_same_partner() -> None:
             [("partnr", "script")],
             "--seat: got 'partnr', expected one of agent, partner; did you mean 'partner'?",
         ),
-        ([("partner", "script"), ("partner", "random")], "--seat: got two players for partner, expected one"),
+        ([("partner", "script"), ("partner", "random")], "--seat: got 2 players for partner, expected one"),
         (
             [("agent", "random"), ("partner", "script")],
             "--seat: got a player for agent, partner, expected one seat left for who plays",

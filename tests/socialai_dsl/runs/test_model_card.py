@@ -63,7 +63,16 @@ def test_it_tells_what_was_trained_and_how_well_it_does(card: str) -> None:
     (weights,) = re.findall(r"`(checkpoints/\d+\.safetensors)`", card)
     assert Path(weights).is_file()
     assert {"lr", "bonus", "guide", "recipe", "minibatches"} <= settings.keys()
-    told_elsewhere = {"scenario", "agent", "seed", "device", "threads", "eval_episodes", *WITHOUT_EFFECT}
+    told_elsewhere = {
+        "scenario",
+        "agent",
+        "seed",
+        "device",
+        "threads",
+        "eval_episodes",
+        "seats",
+        *WITHOUT_EFFECT,
+    }
     for name, value in settings.items():
         assert (f"| `{name}` | `{value}` |" in card) == (name not in told_elsewhere), name
     happened = [ending for ending in figures["eval"]["endings"] if ending["episodes"]]
