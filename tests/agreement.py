@@ -458,7 +458,7 @@ def questions_agree(
         action = np.asarray(choose())
         observation, _, terminated, truncated, _ = env.step(action)
         t, ended = t + 1, terminated or truncated
-        now = asker.step(action, observation["image"], ended)
+        now = asker.step([action], observation["image"], ended)
         reference.step(plain_action(action))
 
 

@@ -2205,7 +2205,7 @@ def _asked(play: Folder, probe: str, *bodies: str) -> list[list[tuple[str, str]]
     for body in bodies:
         action = env.encode_action((None if body == "stay" else body, None))
         observation, _, terminated, truncated, _ = env.step(action)
-        found.append(asker.step(action, observation["image"], terminated or truncated))
+        found.append(asker.step([action], observation["image"], terminated or truncated))
     return [[(question.probe, question.right) for question in now] for now in found]
 
 

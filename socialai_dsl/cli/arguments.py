@@ -81,17 +81,21 @@ def add_participant(parser: argparse.ArgumentParser, whose: str = "") -> None:
 
 
 def add_seats(
-    parser: argparse.ArgumentParser, more: str = "; the one who plays has the first seat that is left"
+    parser: argparse.ArgumentParser,
+    more: str = "; the one who plays has the first seat that is left",
+    models: bool = False,
 ) -> None:
-    """Declare who sits on other seats than the one who plays."""
+    """Declare who sits on other seats than the one who plays; `models`: also language models."""
+    trained = (
+        "a run, a checkpoint, shipped:NAME or llm:MODEL" if models else "a run, a checkpoint or shipped:NAME"
+    )
     parser.add_argument(
         "--seat",
         action="append",
         type=seat_and_player,
         default=[],
         metavar="NAME=PLAYER",
-        help="who plays a member of the cast with a seat: script, random, nobody, a run, a checkpoint or shipped:NAME "
-        f"(repeatable){more}",
+        help=f"who plays a member of the cast with a seat: script, random, nobody, {trained} (repeatable){more}",
     )
 
 

@@ -22,7 +22,7 @@ from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.test_set import Evaluation
-from socialai_dsl.runs.evaluate import RECORDED, evaluate_each, made_player, result_of
+from socialai_dsl.runs.evaluate import RECORDED, evaluate_each, made_players, result_of
 from socialai_dsl.runs.folder import EVALUATIONS, REPLAY, RESULT
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
@@ -98,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="number of episodes in a row that the agent remembers, with results by trial (default: 1)",
     )
-    add_seats(parser)
+    add_seats(parser, models=True)
     add_participant(parser, "for the agent human: ")
     parser.add_argument(
         "--view",
@@ -119,10 +119,10 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
     if agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
-    player = made_player(agent, scenarios, typed_options(arguments, _OPTIONS), out)
+    player, seats = made_players(agent, arguments.seat, scenarios, typed_options(arguments, _OPTIONS), out)
     recorded = RECORDED if arguments.record is None else arguments.record
     results = []
-    asked = arguments.episodes, recorded, out, arguments.trials, arguments.seat
+    asked = arguments.episodes, recorded, out, arguments.trials, seats
     for evaluation in evaluate_each(player, scenarios, *asked):
         results.append(result_of(evaluation))
         for warning in evaluation.warnings:

@@ -134,10 +134,11 @@ class Asker(Companion):
 
     Args:
         loaded: the scenario or suite that the environment plays.
+        own: see `Companion`.
     """
 
-    def __init__(self, loaded: Loaded) -> None:
-        super().__init__(loaded)
+    def __init__(self, loaded: Loaded, own: int | None = None) -> None:
+        super().__init__(loaded, own)
         self.sha256 = sha256(f"{self._playable.sha256} {self._probes}".encode()).hexdigest()
         self._asked: set[str] = set()
         self._act = 0
@@ -150,9 +151,11 @@ class Asker(Companion):
         self._asked, self._act = set(), self._table.state.keys.item(0, Key.ACT)
         return self._questions(begins=True)
 
-    def step(self, action: NDArray[np.int64], image: NDArray[np.uint8], ended: bool) -> list[Question]:
+    def step(
+        self, actions: Sequence[ArrayLike | None], image: NDArray[np.uint8], ended: bool
+    ) -> list[Question]:
         """Take the environment's step (see `follow`), after which the episode may have ended; what is asked now."""
-        self.follow([action], image)
+        self.follow(actions, image)
         return self._questions(ended=ended)
 
     def _questions(self, begins: bool = False, ended: bool = False) -> list[Question]:

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import compiled, make, make_vec
+from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.seats import CALLER, NOBODY, RANDOM, SCRIPT
-from socialai_dsl.episodes.play import AGENT, Seat
+from socialai_dsl.episodes.play import AGENT, Rooms, Seat, Step
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.scripts import with_script
@@ -24,6 +25,7 @@ from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.program_suite import Playable, has_script, seats_of
 from socialai_dsl.source import Source
 from socialai_dsl.traces.endings import short_name
+from socialai_dsl.traces.state import names_of
 
 Partners = Mapping[Seat, Player]
 """Who plays on seats that the one in question does not play."""
@@ -33,9 +35,13 @@ _WORDS = {SCRIPT: "oracle", NOBODY: NOBODY}
 """What is said of a seat alone -> the player that it means."""
 
 
-def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, Player]:
-    """Who is meant by pairs of a seat and a player: `script`, `random`, `nobody`, the path of a trained agent or
-    `shipped:NAME`.
+Named = Sequence[tuple[Seat, str | Player]]
+"""Pairs of a seat and who has it: a `Player`, `script`, `random`, `nobody`, the path of a trained agent,
+`shipped:NAME` or `llm:MODEL`."""
+
+
+def partners_of(named: Named, scenario: str, program: Playable) -> dict[Seat, Player]:
+    """Who is meant by pairs of a seat and a player.
 
     Args:
         named: the pairs.
@@ -52,7 +58,7 @@ def partners_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playa
     return {seat: players[0] for seat, players in found.items()}
 
 
-def pools_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable) -> dict[Seat, list[Player]]:
+def pools_of(named: Named, scenario: str, program: Playable) -> dict[Seat, list[Player]]:
     """`partners_of`, with several players that take turns on a seat; a path with `*` is all that it matches."""
     seats = seats_of(program)
     found: dict[Seat, list[Player]] = {}
@@ -60,12 +66,17 @@ def pools_of(named: Sequence[tuple[Seat, str]], scenario: str, program: Playable
         if seat not in seats:
             near = suggested(seat, seats, quoted=repr)
             raise OptionError(_SEAT, f"got {seat!r}, expected one of {', '.join(seats)}{near}")
-        for one in _matches(name):
-            player = Player(_WORDS[one] if one in _WORDS else named_agent(one, scenario))
-            found.setdefault(seat, []).append(player)
+        for one in [name] if isinstance(name, Player) else _matches(name):
+            found.setdefault(seat, []).append(_meant(one, scenario))
     if len(found) == len(seats):
         raise OptionError(_SEAT, f"got a player for {', '.join(seats)}, expected one seat left for who plays")
     return found
+
+
+def _meant(name: str | Player, scenario: str) -> Player:
+    if isinstance(name, Player):
+        return name
+    return Player(_WORDS[name] if name in _WORDS else named_agent(name, scenario))
 
 
 def _matches(name: str) -> list[str]:
@@ -161,7 +172,7 @@ class Company:
 
     Attributes:
         envs: a vector environment with all seats.
-        policies: of each seat that is played.
+        policies: of each seat that is played, but for those of language models.
         own: the seat of the one in question. scripts: the seats that nobody plays; they follow their scripts.
         told: what is to be known about the players.
     """
@@ -177,7 +188,7 @@ class Company:
 def company(
     players: Mapping[Seat, Player], own: Seat, scenario: str, loaded: Loaded, program: Playable, games: int
 ) -> Iterator[Company]:
-    """Rooms in which these players sit on all seats.
+    """Rooms in which these players sit on all seats; for language models the caller has the policies.
 
     Args:
         players: of each seat.
@@ -190,8 +201,11 @@ def company(
     Raises:
         UsageError: a player does not fit the scenario, now or in the block.
     """
-    if any(player.is_trained for player in players.values()):
-        require_trainer()
+    for seat, player in players.items():
+        if player.is_person:
+            raise OptionError(_SEAT, f"got 'human' for {seat}, expected a player who needs no terminal")
+        if player.is_trained:
+            require_trainer()
     played = compiled(with_script(scenario, loaded).loaded) if players[AGENT].is_script else program
     seats = seats_of(program)
     scripts = tuple(seat for seat in seats if seat != AGENT and players[seat].is_script)
@@ -207,7 +221,7 @@ def company(
         policies: dict[Seat, Policy] = {}
         told: list[str] = []
         for number, seat in enumerate(seats):
-            if seat in scripts:
+            if seat in scripts or players[seat].is_model:
                 continue
             if players[seat].is_script:
                 policies[seat] = AgentsScript(envs)
@@ -245,6 +259,20 @@ def acts_of_others(env: Any) -> dict[Seat, Int64]:
     """
     done = {seat: env.seat_moment(seat).action for seat in env.seats if seat not in env.seat_names}
     return {seat: action for seat, action in done.items() if action is not None}
+
+
+def acts_of_all(rooms: Rooms, step: Step) -> dict[Seat, Int64]:
+    """What was done in a step of the first of these rooms on each seat where somebody sits, int64 (heads,) each."""
+    done = {seat: actions[0] for seat, actions in step.actions.items()}
+    return done | acts_of_others(rooms.env) if isinstance(rooms.env, ScenarioEnv) else done
+
+
+def name_of(rooms: Rooms, seat: Seat, loaded: Loaded) -> str:
+    """The name by which others hear who has a seat, in the first of these rooms of what was loaded."""
+    described = rooms.described()
+    if isinstance(loaded, LoadedSuite):
+        loaded = loaded.members[loaded.member_names.index(described["member"])]
+    return names_of(loaded.checked, described)[seat]
 
 
 def by_seat(acts: Sequence[Mapping[Seat, Any]]) -> dict[Seat, list[Int64]]:

@@ -12,8 +12,9 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.envs.scenario_env import encode_action
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
-from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.program_suite import ProgramSuite, outcome_name
 
 Bools = NDArray[np.bool_]
 Int64 = NDArray[np.int64]
@@ -49,6 +50,10 @@ class Step:
     info: Mapping[str, Any]
     others: Mapping[Seat, tuple[NDArray[np.float64], Bools]] = field(default_factory=dict)
 
+    def of(self, seat: Seat) -> tuple[NDArray[np.float64], Bools]:
+        """Reward, float64 (E,), and success, bool (E,), of a seat, the rooms' own one among them."""
+        return self.others.get(seat, (self.reward, self.success))
+
 
 class Observer:
     """Watches rooms. The methods do nothing here; an observer has those that it needs."""
@@ -61,6 +66,9 @@ class Observer:
 
     def back(self, rooms: Rooms) -> None:
         """The last step of the one room was taken back."""
+
+    def cut(self, rooms: Rooms) -> None:
+        """The episode of the one room was ended without a step."""
 
 
 class Rooms:
@@ -157,8 +165,34 @@ class Rooms:
             observer.stepped(self, step)
         return step
 
+    def heard(self, seat: Seat) -> dict[str, Any]:
+        """What is heard on a seat of the first room, as the infos of a single environment have it.
+
+        Returns:
+            `utterance`, the lines heard in the last step, and of a suite the `member` that is played.
+        """
+        if not self._many:
+            return {name: self.info[name] for name in ("utterance", "member") if name in self.info}
+        number = self.names.index(seat)
+        member = self.env.members()[number]
+        return {"utterance": self.env.utterances()[number]} | ({} if member is None else {"member": member})
+
+    def encoded(self, action: Sequence[Any]) -> Int64:
+        """The action that words mean in the first room, int64 (heads,), see `encode_action`."""
+        if not self._many:
+            found: Int64 = self.env.encode_action(action)
+            return found
+        program = self.env.program
+        live = program.live(int(self.env.member_ids()[0])) if isinstance(program, ProgramSuite) else None
+        return encode_action(action, program.actions, program.sentences, live)
+
+    def described(self) -> dict[str, Any]:
+        """The state of the first room in the scenario's own names."""
+        found: dict[str, Any] = self.env.describe(0) if self._many else self.env.describe()
+        return found
+
     def cut(self) -> None:
-        """End the episode of the one room without a step; observers are not told.
+        """End the episode of the one room without a step.
 
         Raises:
             ValueError: there are several rooms.
@@ -166,6 +200,8 @@ class Rooms:
         if self.count != 1:
             raise ValueError(f"cut: got {self.count} rooms, expected one")
         self.running = np.zeros(1, np.bool_)
+        for observer in self.observers:
+            observer.cut(self)
 
     def _checked(self, seat: Seat, actions: Any) -> Int64:
         """Actions of the right shape. Raises ValueError for others; the environment looks at their range."""

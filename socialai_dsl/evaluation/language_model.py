@@ -5,22 +5,24 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from reprlib import repr as shortened
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.briefing import Briefing
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Asker, probe_names
-from socialai_dsl.episodes.players import MODEL_PREFIX
+from socialai_dsl.episodes.partners import company, sitting
+from socialai_dsl.episodes.play import AGENT, Seat
+from socialai_dsl.episodes.players import MODEL_PREFIX, Player
 from socialai_dsl.episodes.results import EvalResult
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
@@ -32,7 +34,7 @@ from socialai_dsl.traces.endings import Ending
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint
-    from socialai_dsl.llm.players import Budget, PlayedEpisode
+    from socialai_dsl.llm.players import Budget, LanguageModelPlayer, PlayedEpisode, PlayedGame
 
 TRANSCRIPTS: Final = "transcripts"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
@@ -43,12 +45,14 @@ _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECA
 
 @dataclass(frozen=True)
 class ModelEpisodes:
-    """The results of test episodes that a model has played.
+    """The results of test episodes that models have played.
 
     Attributes:
         result: as for all agents.
-        actions: of each episode, int64 (heads,) each. replies: what the model answered before each of them.
+        actions: of each episode, int64 (heads,) each, of several seats (S, heads).
+        replies: what the model whose results these are answered before each of them.
         endings: further ways in which episodes ended. figures: further ones.
+        own: the seat whose results these are. players: who sat on all seats, if there are several.
     """
 
     result: EvalResult
@@ -56,70 +60,67 @@ class ModelEpisodes:
     replies: dict[int, list[list[tuple[str, str]]]]
     endings: list[Ending]
     figures: dict[str, Any]
+    own: Seat = AGENT
+    players: Mapping[Seat, str] = field(default_factory=dict)
 
 
-def let_a_model_play(
-    agent: str,
+def let_models_play(
+    players: Mapping[Seat, Player],
+    own: Seat,
     scenario: str,
     loaded: Loaded,
     program: Playable,
     episodes: int,
     out: Path,
-    options: ModelOptions,
-    briefing: Briefing,
     trials: int = 1,
 ) -> ModelEpisodes:
-    """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
+    """Let players, models among them, play test episodes 0 to `episodes - 1`; answers in transcripts are not asked for.
 
     Args:
-        agent: `llm:MODEL`.
+        players: of each seat.
+        own: the seat whose results these are.
         scenario: as it was asked for.
         loaded: what its file means.
         program: its program.
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
-        options: how it is asked.
-        briefing: what it is told of the task.
         trials: how many episodes in a row are one conversation.
 
     Raises:
-        UsageError: the endpoint does not answer, or an option is not what was expected.
-        RunFailed: the budget is spent before the end.
+        UsageError: an endpoint does not answer, or an option is not what was expected.
+        RunFailed: a budget is spent before the end.
     """
     if find_spec("httpx") is None:
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
     from socialai_dsl.llm.endpoint import EndpointError
-    from socialai_dsl.llm.players import (
-        LanguageModelPlayer,
-        PromptOptions,
-        SettingsMismatchError,
-        transcripts,
-    )
+    from socialai_dsl.llm.players import SettingsMismatchError, play_games, transcripts
     from socialai_dsl.llm.view import TextView
 
-    endpoint = _endpoint(agent, options)
-    asked: dict[str, Any] = {
-        field.name: getattr(options, field.name, trials) for field in fields(PromptOptions)
-    }
-    prompting = PromptOptions(**asked)
-    names = probe_names(loaded) if prompting.probes != "off" else ()
-    budget = _budget(options.budget, endpoint.prices)
-    settings = {
-        "scenario": scenario,
-        "program_sha256": program.sha256,
-        "model": endpoint.model,
-        "address": endpoint.address,
-        **briefing.record(),
-        **vars(prompting),
-        **endpoint.options,
-        "probes": f"{prompting.probes} {Asker(loaded).sha256}" if names else None,
-    }
     folder = out / scenario_folder_name(scenario) / TRANSCRIPTS
+    seated = {seat: player for seat, player in players.items() if player.is_model}
+    first = own if own in seated else next(iter(seated))
+    options = seated[first].options
+    assert options is not None, "internal: a language model has options"
+    words = _words(players, program) if len(players) > 1 else {}
+    about: dict[str, Any] = {"scenario": scenario, "program_sha256": program.sha256, "trials": trials}
+    about |= {"seat": own, "players": words} if words else {}
     progress = _Progress(episodes)
     try:
-        place = transcripts(folder, settings)
-        player = LanguageModelPlayer(program, endpoint, prompting, place, loaded if names else None, briefing)
-        played = player.play(episodes, options.concurrency, budget, progress.note)
+        if own not in seated:
+            transcripts(folder, about | {"seed": players[own].seed, "greedy": players[own].greedy})
+        models = [
+            _model(seated[seat], seat, folder if seat == own else folder / seat, loaded, program, about)
+            for seat in sorted(seated, key=lambda seat: seat != first)
+        ]
+        played = play_games(
+            models,
+            lambda: company(players, own, scenario, loaded, program, 1),
+            episodes,
+            trials,
+            options.concurrency,
+            progress.note,
+            folder,
+        )
     except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
     except EndpointError as error:
@@ -129,24 +130,65 @@ def let_a_model_play(
             f"the budget is spent: {len(played)} of {episodes} episodes are over; the same command goes on with "
             f"another {options.budget}"
         )
-    return _outcome(played, program, {"text": TextView.version} | _probes(played, names))
+    probed = {"text": TextView.version}
+    if own in seated and options.probes != "off":
+        probed |= _probes([game.models[own] for game in played], probe_names(loaded))
+    return replace(_outcome(played, program, own, probed), players=words)
 
 
-def episodes_of_model(run: Path, program: Playable, most: int) -> ModelEpisodes:
-    """The results of the first episodes of a model, from their transcripts in the folder `run`.
+def _words(players: Mapping[Seat, Player], program: Playable) -> dict[Seat, str]:
+    """Who has each seat, in a word."""
+    beside = sitting(program, players, "")
+    return {seat: player.agent if player.is_model else beside[seat] for seat, player in players.items()}
+
+
+def _model(
+    player: Player, seat: Seat, folder: Path, loaded: Loaded, program: Playable, about: Mapping[str, Any]
+) -> "LanguageModelPlayer":
+    """A model on a seat, whose transcripts are in a folder of their own.
+
+    Raises:
+        UsageError, SettingsMismatchError: see `let_models_play`.
+    """
+    from socialai_dsl.llm.players import LanguageModelPlayer, PromptOptions, transcripts
+
+    options = player.options
+    assert options is not None, "internal: a language model has options"
+    endpoint, briefing = _endpoint(player.agent, options), player.briefing(loaded)
+    asked: dict[str, Any] = {
+        field.name: getattr(options, field.name, about["trials"]) for field in fields(PromptOptions)
+    }
+    prompting = PromptOptions(**asked)
+    probed = prompting.probes != "off" and probe_names(loaded)
+    settings = {
+        **about,
+        "model": endpoint.model,
+        "address": endpoint.address,
+        **briefing.record(),
+        **vars(prompting),
+        **endpoint.options,
+        "probes": f"{prompting.probes} {Asker(loaded).sha256}" if probed else None,
+    }
+    place = transcripts(folder, settings)
+    budget = _budget(options.budget, endpoint.prices)
+    return LanguageModelPlayer(program, endpoint, prompting, place, loaded, briefing, seat, budget)
+
+
+def episodes_of_models(run: Path, program: Playable, most: int) -> ModelEpisodes:
+    """The results of the first episodes with models, from their transcripts in the folder `run`.
 
     Raises:
         UsageError: there are none of this program.
     """
-    from socialai_dsl.llm.players import SettingsMismatchError, kept_episodes
+    from socialai_dsl.llm.players import SettingsMismatchError, kept_games
 
     try:
-        played = kept_episodes(program, run / TRANSCRIPTS, most)
+        kept = kept_games(program, run / TRANSCRIPTS, most)
     except SettingsMismatchError as error:
         raise UsageError(str(error)) from None
-    if not played:
+    if not kept.games:
         raise UsageError(f"{run}: no episode is over")
-    return _outcome(played, program)
+    return replace(_outcome(kept.games, program, kept.own), players=kept.players)
 
 
 def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
@@ -225,13 +267,21 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
 
 
 def _outcome(
-    played: "Sequence[PlayedEpisode]", program: Playable, probes: dict[str, Any] | None = None
+    played: "Sequence[PlayedGame]",
+    program: Playable,
+    own: Seat,
+    more: Mapping[str, Any] = MappingProxyType({}),
 ) -> ModelEpisodes:
-    results = [episode.result for episode in played]
+    results = [game.result for game in played]
     cut_short = [name for name in CUT_SHORT if any(result.ending == name for result in results)]
     names = [*program.outcomes, *cut_short]
-    rules = {
-        name: sum(episode.rules.get(name, 0) for episode in played) / len(played) for name in played[0].rules
+    rules = {name: sum(game.rules.get(name, 0) for game in played) / len(played) for name in played[0].rules}
+    others = {
+        seat: (
+            np.array([game.others[seat][0] for game in played]),
+            np.array([game.others[seat][1] for game in played]),
+        )
+        for seat in played[0].others
     }
     result = EvalResult(
         np.array([result.success for result in results]),
@@ -240,11 +290,19 @@ def _outcome(
         np.array([result.total for result in results]),
         tuple(names),
         rules,
+        others,
     )
-    more = [Ending(name, False, CUT_SHORT[name]) for name in cut_short]
-    actions = {episode.number: episode.actions for episode in played}
-    replies = {episode.number: episode.replies for episode in played}
-    return ModelEpisodes(result, actions, replies, more, _figures(played) | (probes or {}))
+    endings = [Ending(name, False, CUT_SHORT[name]) for name in cut_short]
+    figures = {seat: _figures([game.models[seat] for game in played]) for seat in played[0].models}
+    beside = {seat: one for seat, one in figures.items() if seat != own}
+    return ModelEpisodes(
+        result,
+        {game.number: game.actions for game in played},
+        {game.number: game.models[own].replies for game in played if own in game.models},
+        endings,
+        figures.get(own, {}) | ({"models": beside} if beside else {}) | dict(more),
+        own,
+    )
 
 
 def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:

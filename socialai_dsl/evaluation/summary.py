@@ -45,6 +45,8 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     ]
     if "invalid_rate" in figures:
         rows += _model_rows(figures)
+    for seat, found in figures.get("models", {}).items():
+        rows += [(f"{name} of {seat}", value) for name, value in _model_rows(found)]
     if figures.get("unsolved"):
         rows.append(("unsolved", _numbers(figures["unsolved"])))
     return rows

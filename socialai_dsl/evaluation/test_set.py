@@ -14,20 +14,28 @@ from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.envs.seats import NOBODY, SCRIPT
 from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
-from socialai_dsl.episodes.partners import Company, Partners, company, own_seat, replayed_seats, sitting
+from socialai_dsl.episodes.partners import (
+    Company,
+    Partners,
+    company,
+    own_seat,
+    replayed_seats,
+    sitting,
+)
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, TestEpisodes, play
 from socialai_dsl.episodes.players import Player, make_policy
 from socialai_dsl.episodes.policies import Policy
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
 from socialai_dsl.errors import UsageError
-from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_model, let_a_model_play
+from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_models, let_models_play
 from socialai_dsl.evaluation.people import play_test_episodes
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
-from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed, seats_of
+from socialai_dsl.program_suite import Playable, ProgramSuite, has_script, prefixed, seats_of
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
@@ -275,24 +283,23 @@ def play_test_set(
     if player.is_person:
         person = play_test_episodes(player, scenario, program, episodes, briefing)
         return _of_person(person, scenario, loaded, program, player, briefing)
-    if player.is_model:
-        assert player.options is not None, "internal: a language model has options"
-        played = let_a_model_play(
-            player.agent,
-            scenario,
-            loaded,
-            program,
-            episodes,
-            player.kept_in,
-            player.options,
-            briefing,
-            trials,
-        )
-        return replace(_of_model(played, scenario, loaded, program, player, briefing), trials=trials)
+    own = own_seat(partners, program)
+    if models := [one for one in (player, *partners.values()) if one.is_model]:
+        if player.is_model:  # on one seat alone
+            partners = {
+                seat: partners.get(seat) or Player("oracle" if has_script(program, seat) else NOBODY)
+                for seat in seats_of(program)
+                if seat != own
+            }
+        players = {seat: partners.get(seat, player) for seat in seats_of(program)}
+        place = models[0].kept_in
+        played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials)
+        found = _of_models(played, scenario, loaded, program, player, partners, briefing)
+        return replace(found, trials=trials)
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
         result = _result_of(playing, episodes, [kept], trials)
-    told, own = playing.told, playing.own
+    told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
     return replace(found, trials=trials, seat=own, partners=partners)
 
@@ -354,15 +361,23 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
     """
     loaded = load(scenario)
     program = compile_loaded(loaded)
-    return _of_model(episodes_of_model(run, program, most), scenario, loaded, program, Player(agent, out=run))
+    kept = episodes_of_models(run, program, most)
+    partners = {seat: _seated(word) for seat, word in kept.players.items() if seat != kept.own}
+    return _of_models(kept, scenario, loaded, program, Player(agent, out=run), partners)
 
 
-def _of_model(
+def _seated(word: str) -> Player:
+    """Who was meant by a word of `sitting`; it need not play again."""
+    return Player("oracle" if word == SCRIPT else word)
+
+
+def _of_models(
     played: ModelEpisodes,
     scenario: str,
     loaded: Loaded,
     program: Playable,
     player: Player,
+    partners: Partners,
     briefing: Briefing = NO_BRIEFING,
 ) -> Evaluation:
     return Evaluation(
@@ -376,6 +391,8 @@ def _of_model(
         more=played.figures,
         replies=played.replies,
         briefing=briefing,
+        seat=played.own,
+        partners=partners,
     )
 
 

@@ -15,11 +15,12 @@ from socialai_dsl.envs import ScenarioEnv, make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.factory import Scenario, load_playable
-from socialai_dsl.episodes.play import Rooms, Step
+from socialai_dsl.episodes.partners import acts_of_all, name_of
+from socialai_dsl.episodes.play import AGENT, Rooms, Seat, Step
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, ToolCall
 from socialai_dsl.llm.questions import AnsweredQuestion, read_answer
 from socialai_dsl.llm.view import LastStep, Style, TextView, over
-from socialai_dsl.program_suite import Playable, outcome_name
+from socialai_dsl.program_suite import Playable, seats_of
 
 OnInvalid = Literal["noop", "retry", "fail"]
 """What a reply without an action does: pass the turn, ask again, or end the episode."""
@@ -30,10 +31,12 @@ Reply = str | Sequence[ToolCall]
 INVALID: Final = "invalid reply"
 STOPPED: Final = "reply cut off"
 CONTEXT: Final = "context full"
+LEFT: Final = "left alone"
 CUT_SHORT: Final = {
     INVALID: "a reply without an action",
     STOPPED: "a reply without an action, which the server cut off or held back",
     CONTEXT: "a conversation longer than the model's context",
+    LEFT: "a language model on another seat that ended so",
 }
 """How episodes end that no step ends, with what ended them."""
 _STOPS: Final = {
@@ -106,7 +109,7 @@ class Decision:
 
 
 class TextSeat(Copied):
-    """The agent's seat of one room in text: writes what is seen, reads replies, and counts. Others play the steps.
+    """A seat of one room in text: writes what is seen, reads replies, and counts. Others play the steps.
 
     Args:
         program: of a scenario or suite.
@@ -116,8 +119,11 @@ class TextSeat(Copied):
             reply in a row passes the turn), `fail` ends the episode.
         briefing: what the instructions say of the task.
         probes: the scenario as `load` returns it, to ask its probes, which changes nothing else.
+        seat: which one.
+        loaded: the scenario as `load` returns it; of several players one is told its name then.
 
     Attributes:
+        seat: see above.
         instructions: the text that a model reads before the first observation; of a suite, once an episode has begun.
         actions: the actions of this episode, int64 (heads,) each.
         answered: the answers to probes of this episode, in the order given.
@@ -134,20 +140,26 @@ class TextSeat(Copied):
         on_invalid: OnInvalid = "noop",
         briefing: Briefing = NO_BRIEFING,
         probes: Loaded | None = None,
+        seat: Seat = AGENT,
+        loaded: Loaded | None = None,
     ) -> None:
         if on_invalid not in get_args(OnInvalid):
             raise ValueError(
                 f"on_invalid: got {on_invalid!r}, expected one of {', '.join(get_args(OnInvalid))}"
             )
-        self.view = TextView(program, style)
+        self.view = TextView(program, style, seat=seat)
+        self.seat = seat
         self.language = ActionLanguage(program)
         self.briefing = briefing
         self._mode: Mode = mode
         self._member: str | None = None
+        several = len(seats_of(program)) > 1
+        self._loaded = loaded if several else None  # one who plays alone needs no name
         self.instructions = self.view.instructions(mode, self.briefing.text())
         self.actions: list[NDArray[np.int64]] = []
         self.answered: list[AnsweredQuestion] = []
-        self._asker = None if probes is None else Asker(probes)
+        self._seats = seats_of(program)
+        self._asker = None if probes is None else Asker(probes, self._seats.index(seat) if several else None)
         self._questions: list[Question] = []
         self._on_invalid = on_invalid
         self._refused = 0
@@ -157,17 +169,19 @@ class TextSeat(Copied):
 
     def begin(self, rooms: Rooms, seed: int | None = None, options: Mapping[str, Any] | None = None) -> str:
         """Note that an episode has begun in the room, by these arguments of `env.reset`; what is seen at its start."""
-        seen = _seen(rooms)
+        seen = self._seen(rooms)
         self.actions, self._refused, self._result = [], 0, EpisodeResult()
         self.answered = []
         if self._asker is not None:
             self._questions = self._asker.reset(
                 seed, None if options is None else dict(options), seen["image"]
             )
-        self._member = rooms.info.get("member")
-        self.instructions = self.view.instructions(self._mode, self.briefing.text(self._member))
+        heard = rooms.heard(self.seat)
+        self._member = heard.get("member")
+        name = None if self._loaded is None else name_of(rooms, self.seat, self._loaded)
+        self.instructions = self.view.instructions(self._mode, self.briefing.text(self._member), name)
         self._image = seen["image"].copy()
-        self._text = self.view.observe(seen, rooms.info)
+        self._text = self.view.observe(seen, heard)
         return self._text
 
     def read(self, reply: Reply, stop: str = "") -> Decision:
@@ -193,17 +207,20 @@ class TextSeat(Copied):
     def saw(self, rooms: Rooms, decision: Decision, step: Step) -> Turn:
         """The result of a decision whose action was played in the room."""
         assert decision.action is not None, "internal: a step was played"
-        seen, encoded = _seen(rooms), step.actions[rooms.own][0]
+        seen, heard, encoded = self._seen(rooms), rooms.heard(self.seat), step.actions[self.seat][0]
         self.actions.append(encoded)
-        done, reward = bool(step.ended[0]), float(step.reward[0])
+        rewards, successes = step.of(self.seat)
+        done, reward = bool(step.ended[0]), float(rewards[0])
         if self._asker is not None:
-            self._questions = self._asker.step(encoded, seen["image"], done)
+            acts = acts_of_all(rooms, step)
+            self._questions = self._asker.step([acts.get(seat) for seat in self._seats], seen["image"], done)
         self._note(reward, played=True)
-        success = bool(step.success[0]) if done else None
+        success = bool(successes[0]) if done else None
         if success is not None:
-            self._result = replace(self._result, ending=outcome_name(step.info), success=success)
+            ending = rooms.env.program.outcomes[step.outcome[0]]
+            self._result = replace(self._result, ending=ending, success=success)
         last = LastStep(decision.action.movement, self._image, success)
-        self._text = self.view.observe(seen, step.info, last, self._news(step.info))
+        self._text = self.view.observe(seen, heard, last, self._news(heard))
         self._image = seen["image"].copy()
         error = decision.error
         told = f"Your reply was not understood, and you did nothing: {error}\n" if error else ""
@@ -267,6 +284,10 @@ class TextSeat(Copied):
         self._refused = 0
         return Decision(Action(), error)
 
+    def _seen(self, rooms: Rooms) -> dict[str, NDArray[Any]]:
+        """The present observation of the seat in the one room."""
+        return {name: value[0] for name, value in rooms.observations[self.seat].items()}
+
     def _news(self, info: Mapping[str, Any]) -> str:
         """What is told where an episode goes on with another member of a suite; mostly nothing."""
         before, self._member = self.briefing.text(self._member), info.get("member")
@@ -289,6 +310,9 @@ class Episode(TextSeat):
         style, mode, on_invalid, probes: see `TextSeat`.
         briefing: what the instructions say of the task, see `brief`; by default what the scenario's file says, and
             of a program nothing.
+        seats: who fills other seats, as `make` takes it; whoever replies has the first that is left, by default the
+            agent's.
+        loaded: what a program was made of; of a path or a name it is known.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -303,13 +327,15 @@ class Episode(TextSeat):
         on_invalid: OnInvalid = "noop",
         briefing: Briefing | None = None,
         probes: Loaded | None = None,
+        seats: Mapping[Seat, Any] | None = None,
+        loaded: Loaded | None = None,
     ) -> None:
-        program, loaded = load_playable(scenario)
-        super().__init__(
-            program, style, mode, on_invalid, brief(loaded) if briefing is None else briefing, probes
-        )
-        self._rooms = Rooms(make(program))
+        program, own = load_playable(scenario)
+        loaded = own if loaded is None else loaded
+        self._rooms = Rooms(make(program, seats=seats))
         self.env: ScenarioEnv = self._rooms.env
+        told = brief(loaded) if briefing is None else briefing
+        super().__init__(program, style, mode, on_invalid, told, probes, self._rooms.own, loaded)
 
     def reset(self, seed: int | None = None, test_episode: int | None = None) -> str:
         """Begin an episode and return what is seen at its start.
@@ -336,17 +362,12 @@ class Episode(TextSeat):
         if decision.turn is not None:
             return decision.turn
         assert decision.action is not None, "internal: what plays no step has a turn"
-        step = self._rooms.step({self._rooms.own: self.env.encode_action(decision.action)[None]})
+        step = self._rooms.step({self.seat: self._rooms.encoded(decision.action)[None]})
         return self.saw(self._rooms, decision, step)
 
     def close(self) -> None:
         """Let the environment go."""
         self.env.close()
-
-
-def _seen(rooms: Rooms) -> dict[str, NDArray[Any]]:
-    """The present observation of the agent's seat in the one room."""
-    return {name: value[0] for name, value in rooms.observations[rooms.own].items()}
 
 
 def scripted_reply(episode: Episode) -> str:

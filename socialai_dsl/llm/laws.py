@@ -1,15 +1,19 @@
-"""What a model is told before it plays: what is seen and heard, in which order, and what ends an episode."""
+"""What a model is told before it plays: who plays, what is seen and heard, in which order, what ends an episode."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from typing import Final
 
+from socialai_dsl.diagnostics import printable
 from socialai_dsl.llm.looks import steps
 from socialai_dsl.program import VIEW, EntityColumn, Flag, Header, Program
 
 _ANYWHERE: Final = 1 << 16
 """More steps than a room has."""
+
+_COUNTS: Final = ("one", "two", "three", "four", "five", "six", "seven", "eight")
+_PLACES: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 _Reach = tuple[int, int]
 """The least and the greatest distance at which a voice is heard, in steps."""
@@ -18,6 +22,23 @@ _Reach = tuple[int, int]
 def has(program: Program, flag: Flag) -> bool:
     """Whether a program has a flag."""
     return bool(program.header(Header.FLAGS) & flag)
+
+
+def players(programs: Collection[Program], name: str | None) -> str:
+    """That there are several players, and which body is one's own; empty where there is one seat.
+
+    Args:
+        programs: that may be played.
+        name: by which others hear this player; None where it is not known.
+    """
+    count = _seats(programs)
+    if count == 1:
+        return ""
+    named = "" if name is None else f"{printable(name)}, "
+    return (
+        f"You are {named}one of {_COUNTS[count - 1]} players, each with a body of its own: you move and speak with "
+        "yours, and see and hear from where it stands."
+    )
 
 
 def sight(programs: Collection[Program]) -> str:
@@ -37,12 +58,12 @@ def sight(programs: Collection[Program]) -> str:
     return " ".join(told)
 
 
-def hearing(programs: Collection[Program]) -> str:
-    """Who hears whom, and how a line begins; empty where nobody can be heard."""
-    theirs = {reach for program in programs for reach in _reaches(program)}
+def hearing(programs: Collection[Program], seat: str) -> str:
+    """Who hears whom, and how a line begins, for the player of a seat; empty where nobody can be heard."""
+    theirs = {reach for program in programs for reach in _reaches(program, body(program, seat))}
     if not theirs:
         return ""
-    mine = {_reach(program, 0) for program in programs if program.templates}
+    mine = {_reach(program, body(program, seat)) for program in programs if program.templates}
     if theirs == mine and len(mine) == 1:
         told = [f"You and others hear each other when you are {_within(mine, 'each other')}."]
     else:
@@ -59,14 +80,44 @@ def hearing(programs: Collection[Program]) -> str:
     return " ".join(told)
 
 
-def order(programs: Collection[Program]) -> str:
-    """The order of events within a turn."""
+def order(programs: Collection[Program], seat: str) -> str:
+    """The order of events within a turn, for the player of a seat."""
     before = {has(program, Flag.PICTURE_BEFORE_NPCS) for program in programs}
-    heard = ", then you are heard" if any(program.templates for program in programs) else ""
+    speaks = any(program.templates for program in programs)
+    if _seats(programs) == 1:
+        begins = f"In a turn you move first{', then you are heard' if speaks else ''}"
+    else:
+        number = [str(entity) for entity in next(iter(programs)).seats].index(seat)
+        begins = (
+            f"In a turn the players move one after the other, you {_PLACES[number]}"
+            f"{', then they are heard in the same order' if speaks else ''}"
+        )
     others = "then the others act one after the other"
     if before == {True}:
-        return f"In a turn you move first{heard}; you see this moment, {others}, and you hear what they say."
-    return f"In a turn you move first{heard}, {others}, then you see and hear the result."
+        return f"{begins}; you see this moment, {others}, and you hear what they say."
+    return f"{begins}, {others}, then you see and hear the result."
+
+
+def pushing(programs: Collection[Program], seat: str) -> str:
+    """That others can push one's own body; empty where they cannot."""
+    if not any(is_pushed(program, seat) for program in programs):
+        return ""
+    return "Who walks into you pushes you one step the same way, if that cell is free."
+
+
+def is_pushed(program: Program, seat: str) -> bool:
+    """Whether others can push the body of a seat."""
+    manners = program.table(Header.ENTITY_AT)[body(program, seat), EntityColumn.MANNERS]
+    return bool(manners & 2)
+
+
+def body(program: Program, seat: str) -> int:
+    """The number of the entity that the player of a seat has."""
+    return [str(entity) for entity in program.entities].index(seat)
+
+
+def _seats(programs: Collection[Program]) -> int:
+    return max(len(program.seats) for program in programs)
 
 
 def ending(programs: Collection[Program]) -> str:
@@ -75,12 +126,13 @@ def ending(programs: Collection[Program]) -> str:
     return f"An episode ends with success, with failure, or after {turns} turns."
 
 
-def _reaches(program: Program) -> Iterator[_Reach]:
-    """Of the voices that the agent can hear."""
+def _reaches(program: Program, own: int) -> Iterator[_Reach]:
+    """Of the voices that a body can hear."""
     hidden = has(program, Flag.NPCS_HIDDEN)
     for number, entity in enumerate(program.entities):
         audible = program.table(Header.ENTITY_AT)[number, EntityColumn.MANNERS] & 1
-        if entity.role == "npc" and (audible or not hidden):
+        speaks = entity.role == "npc" or (number == 0 and program.templates)
+        if number != own and speaks and (audible or not hidden):
             yield _reach(program, number)
 
 

@@ -9,8 +9,10 @@ import os
 import secrets
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
+from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -22,13 +24,25 @@ from numpy.typing import NDArray
 from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded
-from socialai_dsl.envs import make
-from socialai_dsl.envs.asking import Question
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Step, TestEpisodes, at_once, play_async
-from socialai_dsl.episodes.policies import EpisodeOver, Observation, PolicyDone
+from socialai_dsl.envs import make_vec
+from socialai_dsl.envs.asking import Question, probe_names
+from socialai_dsl.envs.seats import SCRIPT
+from socialai_dsl.episodes.partners import Company
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, Step, TestEpisodes, at_once, play_async
+from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
+from socialai_dsl.episodes.results import Actions
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
-from socialai_dsl.llm.episode import CONTEXT, CUT_SHORT, Decision, EpisodeResult, OnInvalid, TextSeat, Turn
+from socialai_dsl.llm.episode import (
+    CONTEXT,
+    CUT_SHORT,
+    LEFT,
+    Decision,
+    EpisodeResult,
+    OnInvalid,
+    TextSeat,
+    Turn,
+)
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.replies import readable
@@ -91,14 +105,13 @@ class Budget:
 
 @dataclass(frozen=True)
 class PlayedEpisode:
-    """A test episode that was played to its end.
+    """A test episode as a model played it to its end.
 
     Attributes:
         number: of the test episode.
         result: how it went. actions: int64 (heads,) each.
         replies: what the model answered before each action, and after the last one if that ended the episode; each
             with what was wrong with it.
-        rules: how often each of the scenario's rules fired.
         usage: what its replies took.
         stops: why the server ended replies before their end, `length` and the like, and how often.
         answered: the answers to probes.
@@ -108,10 +121,30 @@ class PlayedEpisode:
     result: EpisodeResult
     actions: list[NDArray[np.int64]]
     replies: list[list[tuple[str, str]]]
-    rules: Mapping[str, int]
     usage: Usage
     stops: Mapping[str, int] = field(default_factory=dict)
     answered: Sequence[AnsweredQuestion] = ()
+
+
+@dataclass(frozen=True)
+class PlayedGame:
+    """A test episode that was played to its end, with a model on one seat or several.
+
+    Attributes:
+        number: of the test episode.
+        result: how it went for the rooms' own seat.
+        actions: int64 (heads,) each, of several seats (S, heads).
+        rules: how often each of the scenario's rules fired.
+        others: of each other seat whether the episode was its success, and its return.
+        models: the episode of each model, by its seat.
+    """
+
+    number: int
+    result: EpisodeResult
+    actions: list[NDArray[np.int64]]
+    rules: Mapping[str, int]
+    others: Mapping[Seat, tuple[bool, float]]
+    models: Mapping[Seat, PlayedEpisode]
 
 
 class SettingsMismatchError(ValueError):
@@ -152,8 +185,26 @@ def _transcript(folder: Path, number: int) -> Path:
     return folder / f"episode-{number:03d}.jsonl"
 
 
-def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpisode]:
-    """The first episodes that are over, from their transcripts; no model is asked.
+def _actions_file(folder: Path, number: int) -> Path:
+    return folder / f"actions-{number:03d}.json"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Test episodes that a folder of transcripts holds.
+
+    Attributes:
+        games: those that are over. own: the seat whose results these are.
+        players: who sat on all seats, in a word, where there are several.
+    """
+
+    games: list[PlayedGame]
+    own: Seat
+    players: Mapping[Seat, str]
+
+
+def kept_games(program: Playable, folder: Path, most: int) -> Kept:
+    """The first episodes that are over, from their transcripts; nobody is asked.
 
     Args:
         program: of the scenario that was played.
@@ -164,36 +215,64 @@ def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpis
         OSError: a transcript cannot be read.
         SettingsMismatchError: there are none, or they are of another program.
     """
-    try:
-        settings = json.loads((folder / _SETTINGS).read_text(encoding="utf-8"))
-        settings = {"trials": 1} | settings  # older ones know of no sessions
-        prompting = PromptOptions(**{field.name: settings[field.name] for field in fields(PromptOptions)})
-    except (FileNotFoundError, ValueError, KeyError, TypeError):
-        raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
+    settings = _settings_of(folder)
     if settings.get("format") != FORMAT:
         raise SettingsMismatchError(f"{folder} holds episodes of another version of this program")
     if settings.get("program_sha256") != program.sha256:
         raise SettingsMismatchError(f"{folder} holds episodes of another version of the scenario")
-
-    async def nobody(conversation: Conversation) -> Answer:
-        raise PolicyDone
-
-    policy = ModelPolicy(
-        TextSeat(program, **prompting.of_episodes),
-        prompting,
-        lambda number: _transcript(folder, number),
-        nobody,
+    own, players = settings.get("seat", AGENT), settings.get("players", {})
+    places = {seat: folder if seat == own else folder / seat for seat in players or (AGENT,)}
+    models = {seat: _kept_model(program, seat, place) for seat, place in places.items() if _has_model(place)}
+    envs = make_vec(
+        program, copy=False, autoreset_mode="Disabled", seats="all" if len(players) > 1 else AGENT
     )
-    rooms = Rooms(make(program), [policy])
+    # The agent's script acts like anybody else, those of others by themselves.
+    scripts = [seat for seat, word in players.items() if seat != AGENT and word == SCRIPT]
+    games = Games(models, own)
+    rooms = Rooms(envs, [*models.values(), games], own, scripts)
+    policies: dict[Seat, Policy] = {
+        seat: models[seat] if seat in models else _KeptActions(folder, number, len(rooms.action_sizes))
+        for number, seat in enumerate(rooms.names)
+        if seat in rooms.seats
+    }
     try:
-        at_once(play_async(rooms, {AGENT: policy}, TestEpisodes(most, prompting.trials)))
-        return policy.played[:most]
+        at_once(play_async(rooms, policies, TestEpisodes(most, settings["trials"])))
+        return Kept(games.played()[:most], own, players)
     finally:
-        rooms.env.close()
+        envs.close()
+
+
+def _settings_of(folder: Path) -> dict[str, Any]:
+    """What holds for all episodes of a folder. Raises SettingsMismatchError where it holds none."""
+    try:
+        settings: dict[str, Any] = json.loads((folder / _SETTINGS).read_text(encoding="utf-8"))
+        return {"trials": 1} | settings  # older ones know of no sessions
+    except (FileNotFoundError, ValueError, TypeError):
+        raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
+
+
+def _has_model(folder: Path) -> bool:
+    """Whether the transcripts of a model are here."""
+    return (folder / _SETTINGS).is_file() and "model" in _settings_of(folder)
+
+
+def _kept_model(program: Playable, seat: Seat, folder: Path) -> ModelPolicy:
+    """A model that says what it said before. Raises SettingsMismatchError where it is not known how it played."""
+    settings = _settings_of(folder)
+    try:
+        prompting = PromptOptions(**{one.name: settings[one.name] for one in fields(PromptOptions)})
+    except (KeyError, TypeError):
+        raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
+    text = TextSeat(program, **prompting.of_episodes, seat=seat)
+    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody)
+
+
+async def _nobody(conversation: Conversation) -> Answer:
+    raise PolicyDone
 
 
 class LanguageModelPlayer:
-    """Plays test episodes of one scenario, as many at once as asked for.
+    """A model on a seat, in as many rooms at once as are played.
 
     Every reply is on disk before it is played, so an episode goes on where it was stopped, and nothing is paid for
     twice.
@@ -203,8 +282,10 @@ class LanguageModelPlayer:
         endpoint: which model is asked, and where.
         prompting: how it plays.
         place: of the transcript of each episode, see `transcripts`.
-        loaded: what the program was made of; without it no probes are asked.
+        loaded: what the program was made of; without it no probes are asked, and nobody is told a name.
         briefing: what the model is told of the task.
+        seat: which one.
+        budget: when it is spent, no further request is made; what is on the way is waited for.
     """
 
     def __init__(
@@ -215,82 +296,54 @@ class LanguageModelPlayer:
         place: Callable[[int], Path],
         loaded: Loaded | None = None,
         briefing: Briefing = NO_BRIEFING,
+        seat: Seat = AGENT,
+        budget: Budget | None = None,
     ) -> None:
-        self._briefing = briefing
-        self._loaded = None if prompting.probes == "off" else loaded
-        self._program = program
-        self._endpoint = endpoint
+        self.endpoint, self.seat = endpoint, seat
+        self._program, self._loaded, self._briefing = program, loaded, briefing
         self._prompting = prompting
         self._place = place
+        self._budget = budget or Budget()
         self._spent = Usage()
         self._answered = False
 
-    def play(
+    def policy(
         self,
-        episodes: int,
-        concurrency: int = 1,
-        budget: Budget | None = None,
+        client: httpx.AsyncClient,
+        failures: Sequence[Exception],
         progress: Callable[[PlayedEpisode], None] | None = None,
-    ) -> list[PlayedEpisode]:
-        """Play test episodes 0 to `episodes - 1`; those that were played already are read from their transcripts.
+    ) -> ModelPolicy:
+        """The model in one room.
 
         Args:
-            episodes: how many.
-            concurrency: how many are played at once.
-            budget: when it is spent, no further request is made; what is on the way is waited for.
-            progress: is told of each episode that is over.
-
-        Raises:
-            EndpointError: the endpoint does not answer. What was played is kept.
-            OSError: a transcript cannot be read or written.
+            client: for its requests.
+            failures: when there is one, in this room or another, no further request is made.
+            progress: see `ModelPolicy`.
         """
-        return asyncio.run(self._play(episodes, concurrency, budget or Budget(), progress))
 
-    async def _play(
-        self,
-        episodes: int,
-        concurrency: int,
-        budget: Budget,
-        progress: Callable[[PlayedEpisode], None] | None,
-    ) -> list[PlayedEpisode]:
-        trials = self._prompting.trials
-        sessions = iter(range(0, episodes, trials))
-        policies: list[ModelPolicy] = []
-        failures: list[Exception] = []
+        async def ask(conversation: Conversation) -> Answer:
+            # After a failure the others play what they have asked for, which is paid for, and stop as well.
+            if failures:
+                raise PolicyDone
+            if self._budget.is_spent(self._spent):
+                raise EpisodeOver  # a later one may be in its transcript, which costs nothing
+            return await self._ask(client, conversation)
 
-        async def work(client: httpx.AsyncClient) -> None:
-            async def ask(conversation: Conversation) -> Answer:
-                # After a failure the others play what they have asked for, which is paid for, and stop as well.
-                if failures:
-                    raise PolicyDone
-                if budget.is_spent(self._spent):
-                    raise EpisodeOver  # a later one may be in its transcript, which costs nothing
-                return await self._ask(client, conversation)
-
-            seat = TextSeat(
-                self._program, **self._prompting.of_episodes, briefing=self._briefing, probes=self._loaded
-            )
-            policy = ModelPolicy(seat, self._prompting, self._place, ask, progress)
-            policies.append(policy)
-            rooms = Rooms(make(self._program), [policy])
-            try:
-                await play_async(rooms, {AGENT: policy}, TestEpisodes(episodes, trials, sessions))
-            except (EndpointError, OSError) as error:
-                failures.append(error)
-            finally:
-                rooms.env.close()
-
-        async with self._endpoint.client() as client, asyncio.TaskGroup() as group:
-            for _ in range(min(concurrency, episodes // trials)):
-                group.create_task(work(client))
-        if failures:
-            raise failures[0]
-        return sorted((one for policy in policies for one in policy.played), key=lambda one: one.number)
+        asked = self._loaded is not None and self._prompting.probes != "off" and probe_names(self._loaded)
+        text = TextSeat(
+            self._program,
+            **self._prompting.of_episodes,
+            briefing=self._briefing,
+            probes=self._loaded if asked else None,
+            seat=self.seat,
+            loaded=self._loaded,
+        )
+        return ModelPolicy(text, self._prompting, self._place, ask, progress)
 
     async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
         """The model's answer; also that the conversation has outgrown its context, which ends the episode."""
         try:
-            answer = await self._endpoint.ask(
+            answer = await self.endpoint.ask(
                 client, conversation.messages(), conversation.constraints(), self._answered
             )
         except ContextFull:
@@ -302,8 +355,164 @@ class LanguageModelPlayer:
         return answer
 
 
+def play_games(
+    models: Sequence[LanguageModelPlayer],
+    company: Callable[[], AbstractContextManager[Company]],
+    episodes: int,
+    trials: int = 1,
+    concurrency: int = 1,
+    progress: Callable[[PlayedEpisode], None] | None = None,
+    keep: Path | None = None,
+) -> list[PlayedGame]:
+    """Play test episodes 0 to `episodes - 1`; what models have answered already is read from their transcripts.
+
+    Args:
+        models: at least one; all play in each room.
+        company: one room with who sits there beside the models.
+        episodes: how many.
+        trials: how many in a row are one session.
+        concurrency: how many are played at once.
+        progress: is told of each episode that is over, as the first of the models played it.
+        keep: a folder that gets the actions of all seats, where there are several.
+
+    Raises:
+        EndpointError: an endpoint does not answer. What was played is kept.
+        OSError: a transcript cannot be read or written.
+    """
+    return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep))
+
+
+async def _play(
+    models: Sequence[LanguageModelPlayer],
+    company: Callable[[], AbstractContextManager[Company]],
+    episodes: int,
+    trials: int,
+    concurrency: int,
+    progress: Callable[[PlayedEpisode], None] | None,
+    keep: Path | None,
+) -> list[PlayedGame]:
+    sessions = iter(range(0, episodes, trials))
+    tables: list[Games] = []
+    failures: list[Exception] = []
+
+    async def work(clients: Sequence[httpx.AsyncClient]) -> None:
+        policies = {
+            model.seat: model.policy(client, failures, None if number else progress)
+            for number, (model, client) in enumerate(zip(models, clients, strict=True))
+        }
+        with company() as beside:
+            games = Games(policies, beside.own, keep)
+            tables.append(games)
+            rooms = Rooms(beside.envs, [*policies.values(), games], beside.own, beside.scripts)
+            playing = {seat: policies.get(seat) or beside.policies[seat] for seat in rooms.seats}
+            try:
+                await play_async(rooms, playing, TestEpisodes(episodes, trials, sessions))
+            except (EndpointError, OSError) as error:
+                failures.append(error)
+
+    async with contextlib.AsyncExitStack() as open_ones:
+        clients = [await open_ones.enter_async_context(model.endpoint.client()) for model in models]
+        async with asyncio.TaskGroup() as group:
+            for _ in range(min(concurrency, episodes // trials)):
+                group.create_task(work(clients))
+    if failures:
+        raise failures[0]
+    return sorted((game for games in tables for game in games.played()), key=lambda game: game.number)
+
+
+class Games(Observer):
+    """Notes the episodes of one room that are played to their end.
+
+    Args:
+        models: of each seat that a model has.
+        own: the seat whose results these are.
+        keep: a folder that gets the actions of all seats, where there are several.
+    """
+
+    def __init__(self, models: Mapping[Seat, ModelPolicy], own: Seat, keep: Path | None = None) -> None:
+        self._models, self._own, self._keep = models, own, keep
+        self._actions = Actions()
+        self._before: Mapping[str, int] = {}
+        self._totals: dict[Seat, float] = {}
+        self._over: dict[int, PlayedGame] = {}
+        for model in models.values():
+            model.others = [one for one in models.values() if one is not model]
+
+    def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
+        """See `Observer.began`."""
+        self._before = rooms.env.counters()["rules"]
+        self._totals = dict.fromkeys(rooms.names, 0.0)
+        self._actions.played[int(rooms.numbers[0])] = []
+
+    def stepped(self, rooms: Rooms, step: Step) -> None:
+        """See `Observer.stepped`."""
+        self._actions.stepped(rooms, step)
+        for seat in self._totals:
+            self._totals[seat] += float(step.of(seat)[0][0])
+        if step.ended[0]:
+            won = {seat: bool(step.of(seat)[1][0]) for seat in self._totals}
+            self._note(rooms, rooms.env.program.outcomes[step.outcome[0]], won)
+
+    def cut(self, rooms: Rooms) -> None:
+        """See `Observer.cut`."""
+        if any(model.cut_short for model in self._models.values()):
+            self._note(rooms, LEFT, dict.fromkeys(self._totals, False))
+
+    def _note(self, rooms: Rooms, ending: str, won: Mapping[Seat, bool]) -> None:
+        """Note an episode that is over, as far as it is known without the models."""
+        number, own = int(rooms.numbers[0]), self._own
+        fired = {
+            name: count - self._before.get(name, 0) for name, count in rooms.env.counters()["rules"].items()
+        }
+        actions = self._actions.played[number]
+        result = EpisodeResult(won[own], ending, self._totals[own], len(actions))
+        others = {seat: (won[seat], total) for seat, total in self._totals.items() if seat != own}
+        self._over[number] = PlayedGame(number, result, actions, fired, others, {})
+        if self._keep is not None and len(rooms.names) > 1:
+            write_json(_actions_file(self._keep, number), [step.tolist() for step in actions])
+
+    def played(self) -> list[PlayedGame]:
+        """The episodes that are over for all models, the first one first."""
+        told = {seat: {one.number: one for one in model.played} for seat, model in self._models.items()}
+        games = []
+        for number, game in sorted(self._over.items()):
+            models = {seat: episodes[number] for seat, episodes in told.items() if number in episodes}
+            if len(models) == len(told):
+                result = models[self._own].result if self._own in models else game.result
+                games.append(replace(game, result=result, models=models))
+        return games
+
+
+class _KeptActions:
+    """The actions of a seat of one room in games that were kept; behind the last one nothing is done.
+
+    Args:
+        folder: of the games.
+        number: of the seat.
+        heads: of an action.
+    """
+
+    def __init__(self, folder: Path, number: int, heads: int) -> None:
+        self._folder, self._number = folder, number
+        self._nothing = np.zeros((1, heads), np.int64)
+        self._left: Iterator[Any] | None = None
+
+    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """See `Policy.reset`."""
+        assert episodes is not None, "internal: test episodes have numbers"
+        path = _actions_file(self._folder, int(episodes[0]))
+        self._left = iter(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
+
+    def act(self, observation: Observation) -> NDArray[np.int64]:
+        """See `Policy.act`."""
+        if self._left is None:
+            raise PolicyDone
+        actions = next(self._left, None)
+        return self._nothing if actions is None else np.array(actions[self._number], np.int64)[None]
+
+
 class ModelPolicy(Observer):
-    """A language model on the agent's seat of one room, which observes that room as well.
+    """A language model on a seat of one room, which observes that room as well.
 
     Every reply is on disk before it is played. What a transcript holds already is played without asking.
 
@@ -317,6 +526,7 @@ class ModelPolicy(Observer):
 
     Attributes:
         played: these episodes.
+        others: the models on other seats.
     """
 
     def __init__(
@@ -332,8 +542,8 @@ class ModelPolicy(Observer):
         self._rooms: Rooms
         self._conversation: Conversation
         self._decision = Decision(None)
-        self._fired: Mapping[str, int] = {}
         self.played: list[PlayedEpisode] = []
+        self.others: Sequence[ModelPolicy] = ()
 
     def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
         """See `Policy.reset`; `began` knows which trials begin a session."""
@@ -344,7 +554,7 @@ class ModelPolicy(Observer):
         before = self._conversation if number % self._prompting.trials else None
         path = self._place(number)
         text = self._seat.begin(rooms, options={"test_episode": number})
-        self._rooms, self._fired = rooms, rooms.env.counters()["rules"]
+        self._rooms = rooms
         self._conversation = Conversation(self._seat, self._prompting, number, path, text, before)
 
     async def act(self, observation: Observation) -> NDArray[np.int64]:
@@ -353,9 +563,13 @@ class ModelPolicy(Observer):
             decision = await self._next()
             if decision is not None and decision.action is not None:
                 self._decision = decision
-                encoded: NDArray[np.int64] = self._rooms.env.encode_action(decision.action)
-                return encoded[None]
+                return self._rooms.encoded(decision.action)[None]
         raise EpisodeOver
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the model has ended the episode without a step."""
+        return self._seat.result().ending in CUT_SHORT
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
@@ -364,6 +578,8 @@ class ModelPolicy(Observer):
     async def leave(self) -> None:
         """Answer what is asked after the last step, and note the episode; see `Leaving`."""
         with contextlib.suppress(EpisodeOver):
+            if not self._seat.result().ending and any(other.cut_short for other in self.others):
+                self._seat.end(LEFT)
             while self._seat.question is not None:
                 await self._next()
             if self._seat.result().ending:
@@ -377,9 +593,7 @@ class ModelPolicy(Observer):
         return self._conversation.take(record)
 
     def _note(self) -> None:
-        after = self._rooms.env.counters()["rules"]
-        fired = {name: count - self._fired.get(name, 0) for name, count in after.items()}
-        self.played.append(self._conversation.played(fired))
+        self.played.append(self._conversation.played())
         if self._progress is not None:
             self._progress(self.played[-1])
 
@@ -499,14 +713,13 @@ class Conversation:
             os.fsync(file.fileno())
         return record
 
-    def played(self, rules: Mapping[str, int]) -> PlayedEpisode:
-        """The episode, which is over, and how often rules fired."""
+    def played(self) -> PlayedEpisode:
+        """The episode, which is over."""
         return PlayedEpisode(
             self._number,
             self._seat.result(),
             list(self._seat.actions),
             [replies for replies in self._replies if replies],
-            rules,
             self._usage,
             dict(self._stops),
             tuple(self._seat.answered),

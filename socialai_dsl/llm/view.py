@@ -1,4 +1,4 @@
-"""The agent's observation as text, no more and no less."""
+"""The observation of a seat as text, no more and no less."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.briefing import UNTOLD
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.library import types_by_code
 from socialai_dsl.llm import laws
 from socialai_dsl.llm.actions import ActionLanguage, Mode
@@ -29,12 +30,17 @@ from socialai_dsl.llm.looks import (
     steps,
 )
 from socialai_dsl.program import VIEW, Flag, Program
-from socialai_dsl.program_suite import Playable, channels_of, words_of_looks
+from socialai_dsl.program_suite import Playable, channels_of, seats_of, words_of_looks
 from socialai_dsl.render.grid import draw_ansi, letters
-from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN
+from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN, WALL
 
 Style = Literal["prose", "grid", "json"]
 """Sentences with places in steps, as in the SocialAI School; a picture of letters with a legend; JSON."""
+
+Place = tuple[int, int]
+"""Steps ahead of the player, and steps to its right; negative numbers lie to its left."""
+Area = tuple[int, int, int, int]
+"""Least and most steps ahead, least and most to the right."""
 
 _OWN: Final = (VIEW // 2, VIEW - 1)
 _HERE: Final = (0, 0)
@@ -54,12 +60,14 @@ _READING: Final[Mapping[Style, str]] = {
     ),
 }
 """How to read what is seen."""
+_PUSHES: Final[Mapping[Place, str]] = {
+    (1, 0): "ahead",
+    (-1, 0): "back",
+    (0, -1): "to the left",
+    (0, 1): "to the right",
+}
+"""Where a body can be pushed, as its player sees it."""
 _REMEMBERED: Final = 4096
-
-Place = tuple[int, int]
-"""Steps ahead of the agent, and steps to its right; negative numbers lie to its left."""
-Area = tuple[int, int, int, int]
-"""Least and most steps ahead, least and most to the right."""
 
 
 class LastStep(NamedTuple):
@@ -81,30 +89,37 @@ class TextView:
 
     A language model perceives what a trained agent perceives: the text depends on the observation and the lines heard
     alone, and different observations have different texts. Of the step before it the text says what follows from the
-    two pictures, that a step ahead failed, and at the end of an episode whether that is a success.
+    two pictures, that a step ahead failed or that one was pushed, and at the end of an episode whether that is a
+    success.
 
     Args:
         program: of a scenario or suite.
         style: `prose` (sentences with places in steps), `grid` (letters with a legend) or `json`.
         colour: whether the letters of a grid have escape codes for colours, for a terminal.
+        seat: whose observations they are.
 
     Attributes:
         version: of the text; it grows with every change of what models read.
 
     Raises:
-        ValueError: there is no such style.
+        ValueError: there is no such style, or no such seat.
     """
 
-    version: ClassVar[int] = 3
+    version: ClassVar[int] = 4
 
-    def __init__(self, program: Playable, style: Style = "prose", colour: bool = False) -> None:
+    def __init__(
+        self, program: Playable, style: Style = "prose", colour: bool = False, seat: str = AGENT
+    ) -> None:
         if style not in get_args(Style):
             raise ValueError(f"style: got {style!r}, expected one of {', '.join(get_args(Style))}")
-        self._style, self._colour = style, colour
+        if seat not in seats_of(program):
+            raise ValueError(f"seat: got {seat!r}, expected one of {', '.join(seats_of(program))}")
+        self._style, self._colour, self._seat = style, colour, seat
         self._members = _members(program)
         self._kinds = kinds_of(list(self._members.values()))
         self._channels = channels_of(self._members.values())
         self._looks = words_of_looks(self._members.values())
+        self._is_pushed = any(laws.is_pushed(program, seat) for program in self._members.values())
         self._egocentric = {laws.has(program, Flag.EGOCENTRIC) for program in self._members.values()}
         words = Counter(word for look in self._looks.values() for word in look)
         self._shared = frozenset(word for word, looks in words.items() if looks > 1)
@@ -119,30 +134,39 @@ class TextView:
         vars(self).update(state)
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
-    def instructions(self, mode: Mode = "text", goal: str = "") -> str:
+    def instructions(self, mode: Mode = "text", goal: str = "", name: str | None = None) -> str:
         """The possible sights, actions and utterances, and the form of a reply, without a word on the solution.
 
         Args:
             mode: how replies are given: `text`, `json` or `tools`.
             goal: a sentence about the aim; none by default.
+            name: by which others hear the player; it is told where there are several.
         """
         return "\n\n".join(
             (
                 "You are in a room of square cells, in which there may be others. Every turn you are told what you "
                 "see and hear, and you reply with what you do and say.",
-                self.explanation(),
+                self.explanation(name),
                 self._language.instructions(mode),
                 self.task(goal),
             )
         )
 
-    def explanation(self) -> str:
-        """How to read what is seen, who hears whom, and the order of a turn."""
+    def explanation(self, name: str | None = None) -> str:
+        """Who plays, how to read what is seen, who hears whom, and the order of a turn.
+
+        Args:
+            name: see `instructions`.
+        """
         programs = self._members.values()
+        pushed = laws.pushing(programs, self._seat)
+        read = ' "pushed" says which way.' if pushed and self._style == "json" else ""
         parts = (
+            laws.players(programs, name),
             f"{laws.sight(programs)} {_READING[self._style]}",
-            laws.hearing(programs),
-            laws.order(programs),
+            laws.hearing(programs, self._seat),
+            laws.order(programs, self._seat),
+            f"{pushed}{read}",
         )
         return "\n".join(part for part in parts if part)
 
@@ -160,7 +184,7 @@ class TextView:
         """The observation of the present moment as text.
 
         Args:
-            observation: of `ScenarioEnv`.
+            observation: of the seat, as `ScenarioEnv` gives it.
             info: of the same step.
             last: the step before it; None at the start of an episode.
             told: what is told of the task from here on, where that changes.
@@ -170,17 +194,20 @@ class TextView:
         utterance = info["utterance"]
         heard = [] if utterance == "NA" else [printable(line) for line in utterance.split("\n")]
         stayed = last is not None and last.movement == "forward" and _stayed(last.before, image)
+        pushed = _pushed(last, image) if last is not None and self._is_pushed else None
         success = None if last is None else last.success
         if self._style == "json":
             more = {
                 "heard": heard,
                 **({"moved": False} if stayed else {}),
+                **({} if pushed is None else {"pushed": pushed}),
                 **({"told": told} if told else {}),
             }
             more |= {} if success is None else {"over": True, "success": success}
             return f"{seen[:-1]}, {json.dumps(more, ensure_ascii=False)[1:]}"
         lines = [told, ""] if told else []
         lines += ["You did not move."] if stayed else []
+        lines += [] if pushed is None else [f"You were pushed 1 step {pushed}."]
         lines += (
             [seen, "You hear:", *(f"- {line}" for line in heard)] if heard else [seen, "You hear nothing."]
         )
@@ -252,6 +279,40 @@ def _stayed(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> bool:
         return False
     both = known[:, 1:] & known[:, :-1]
     return bool((after[:, 1:] != before[:, :-1]).any(axis=-1)[both].any())
+
+
+def _pushed(last: LastStep, after: NDArray[np.uint8]) -> str | None:
+    """Where two pictures show that the player was pushed in the step between them; None where they do not.
+
+    They do where the walls are as for a body that has gone one way, and not as for one that has gone any other.
+    """
+    before, now = _walls(last.before), _walls(after)
+    if last.movement == "left":
+        before = {(-right, ahead): wall for (ahead, right), wall in before.items()}
+    elif last.movement == "right":
+        before = {(right, -ahead): wall for (ahead, right), wall in before.items()}
+    alone = [_HERE, (1, 0)] if last.movement == "forward" else [_HERE]
+    ways: dict[Place, str | None] = {
+        (ahead + far, right + aside): word for ahead, right in alone for (far, aside), word in _PUSHES.items()
+    }
+    ways |= dict.fromkeys(alone)
+    possible = [way for way in ways if _may_have_gone(way, before, now)]
+    return ways[possible[0]] if len(possible) == 1 else None
+
+
+def _walls(image: NDArray[np.uint8]) -> dict[Place, bool]:
+    """Whether there is a wall in each cell that a picture shows; walls stay as they are."""
+    return {
+        (VIEW - 1 - along, across - VIEW // 2): bool(image[across, along, 0] == WALL)
+        for across, along in np.ndindex(VIEW, VIEW)
+        if image[across, along, 0] != UNSEEN
+    }
+
+
+def _may_have_gone(way: Place, before: Mapping[Place, bool], now: Mapping[Place, bool]) -> bool:
+    """Whether all walls that both pictures show are where they are for one who has gone this way."""
+    ahead, right = way
+    return all(now.get((far - ahead, aside - right), wall) == wall for (far, aside), wall in before.items())
 
 
 def _picture(

@@ -154,7 +154,7 @@ class Game(Observer):
         self._env, self.own = env, self._stage.own
         self._program: Playable = self._env.program
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
-        self._text_view = TextView(self._program, "grid", colour=True)
+        self._text_view = TextView(self._program, "grid", colour=True, seat=self.own)
         self.briefing = brief(loaded) if briefing is None else briefing
         self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
@@ -235,7 +235,7 @@ class Game(Observer):
     @property
     def explanation(self) -> str:
         """How to read what is seen from the seat."""
-        return self._text_view.explanation()
+        return self._text_view.explanation(self.name)
 
     @property
     def steps(self) -> int:

@@ -16,6 +16,7 @@ from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.episodes.partners import partners_of
 from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
+    MODEL_PREFIX,
     Agent,
     Player,
     folder_of,
@@ -69,7 +70,7 @@ def evaluate(
     out: str | Path | None = None,
     record: int = RECORDED,
     trials: int = 1,
-    seats: Mapping[str, str] = MappingProxyType({}),
+    seats: Mapping[str, str | Player] = MappingProxyType({}),
     **options: Any,
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
@@ -85,11 +86,13 @@ def evaluate(
         record: up to how many successes, and how many failures, are filmed there.
         trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
             that they show what can be learnt within a session. A person remembers all of a session in any case.
-        seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, or a trained
-            agent. The agent that is tested plays on the seats that are left, and results are those of the first.
+        seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, a trained agent,
+            `llm:MODEL`, or a `Player`. The agent that is tested plays on the seats that are left, a language model on
+            the first of them alone, and results are those of the first.
         options: of a trained agent `greedy`, `seed`, `device`, `net` and `algorithm`, of `random` the `seed`; of a
             language model those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`,
             see `Player`; of a person `view`, and `participant`, with which the name of the session's folder begins.
+            Those of a language model also hold for the ones among `seats`, each with a budget of its own.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -99,9 +102,9 @@ def evaluate(
         OSError: a file cannot be written.
     """
     named = [] if scenario is None else [str(scenario)]
-    player = made_player(agent, named, options, None if out is None else Path(out))
     place = None if out is None else Path(out)
-    asked = episodes, record, place, trials, list(seats.items())
+    player, partners = made_players(agent, list(seats.items()), named, options, place)
+    asked = episodes, record, place, trials, partners
     with contextlib.closing(evaluate_each(player, named, *asked)) as evaluations:
         return next(evaluations)
 
@@ -113,7 +116,7 @@ def evaluate_each(
     record: int = RECORDED,
     out: Path | None = None,
     trials: int = 1,
-    seats: Sequence[tuple[str, str]] = (),
+    seats: Sequence[tuple[str, str | Player]] = (),
 ) -> Generator[Evaluation, None, None]:
     """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
     if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
@@ -122,7 +125,9 @@ def evaluate_each(
         raise OptionError("trials", f"got {trials!r}, expected a divisor of the {episodes} episodes")
     if player.is_person and trials > 1:
         raise OptionError("trials", f"got {trials}, but a person remembers all episodes of a session")
-    folder = player.kept_in if player.is_model or player.is_person else out
+    partners = [partner for _, partner in seats if isinstance(partner, Player)]
+    keeping = (one.kept_in for one in (player, *partners) if one.is_model or one.is_person)
+    folder = next(keeping, out)
     results = []
     with contextlib.nullcontext() if folder is None else _writing(folder):
         for scenario in scenarios or [own_scenario(str(player.run or player.agent))]:
@@ -149,7 +154,7 @@ def _evaluated(
     trials: int,
     record: int,
     out: Path | None,
-    seats: Sequence[tuple[str, str]],
+    seats: Sequence[tuple[str, str | Player]],
 ) -> Evaluation:
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
@@ -169,6 +174,42 @@ def _evaluated(
     write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
     write_json(place / RESULT, result_of(evaluation))
     return evaluation
+
+
+def made_players(
+    agent: Agent,
+    seats: Sequence[tuple[str, str | Player]],
+    scenarios: Sequence[str],
+    options: Mapping[str, Any],
+    out: Path | None,
+) -> tuple[Player, list[tuple[str, str | Player]]]:
+    """Who plays, and who has other seats; options of language models hold for all of them.
+
+    Args:
+        agent: see `evaluate`.
+        seats: pairs of a seat and who has it.
+        scenarios: what is played.
+        options: see `evaluate`.
+        out: where what a language model or a person plays is kept.
+
+    Raises:
+        OptionError: this agent, or who has the seats, has no use for an option.
+        ValueError: an option that no agent has; or see `evaluate`.
+    """
+    of_models = {name: value for name, value in options.items() if name in (*_MODEL, *_TOLD)}
+    partners = [
+        (
+            seat,
+            made_player(named, scenarios, of_models, out)
+            if isinstance(named, str) and named.startswith(MODEL_PREFIX)
+            else named,
+        )
+        for seat, named in seats
+    ]
+    asked = any(isinstance(named, Player) and named.is_model for _, named in partners)
+    reads = isinstance(agent, str) and Player(agent).kind in ("model", "person")
+    own = {name: value for name, value in options.items() if reads or not asked or name not in of_models}
+    return made_player(agent, scenarios, own, out), partners
 
 
 def made_player(

@@ -16,6 +16,7 @@ from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.players import Agent, Player, folder_of, named_agent
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError, first_mistake
+from socialai_dsl.evaluation.language_model import TRANSCRIPTS
 from socialai_dsl.evaluation.test_set import (
     Evaluation,
     evaluation_of_model,
@@ -154,9 +155,9 @@ def _alone(player: Player, scenario: str, numbers: Sequence[int], trials: int) -
 
 
 def _kept(folder: Path, scenario: str, most: int, greedy: bool) -> Evaluation | None:
-    """What a person or a language model has played in a folder; None of others, who play again."""
+    """What a person, or anybody with a language model, has played in a folder; None of others, who play again."""
     player = Player(agent_of(folder))
-    if not (player.is_person or player.is_model):
+    if not (player.is_person or (folder / TRANSCRIPTS).is_dir()):
         return None
     if greedy:
         raise OptionError("greedy", f"the agent {player.agent!r} has played already")

@@ -56,7 +56,7 @@ def following(name: str, actions: Any, options: dict[str, Any]) -> Iterator[list
     yield asker.reset(None, options, observation["image"])
     for action in actions:
         observation, _, terminated, truncated, _ = env.step(action)
-        yield asker.step(np.asarray(action), observation["image"], terminated or truncated)
+        yield asker.step([action], observation["image"], terminated or truncated)
         if terminated or truncated:
             return
 
