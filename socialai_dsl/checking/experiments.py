@@ -10,7 +10,7 @@ from typing import Final
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
-from socialai_dsl.loader.reader import SUFFIXES, display_name
+from socialai_dsl.loader.reader import SUFFIXES, display_name, shipped_folder
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names
 from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
@@ -98,15 +98,21 @@ def is_phases(curriculum: str | None) -> bool:
 def from_anywhere(name: str, folder: Path) -> str:
     """A name of a scenario or of another file in a file in `folder`, as it is called from any working directory.
 
-    What is neither a path nor the name of something that ships means a file beside the one that names it.
+    What is neither a path nor the name of something that ships, such as `school/boxes`, means a file beside the one
+    that names it.
     """
     base = name.partition("?")[0]
     called = base.partition("+")[0]
-    if not looks_like_path(called) and (
-        called in shipped_names() or not (folder / f"{called}.yaml").is_file()
+    if not _stands_in(folder, called) and (
+        not looks_like_path(called) or _stands_in(shipped_folder(), called)
     ):
         return name
     return os.path.abspath(folder / base) + name[len(base) :]
+
+
+def _stands_in(folder: Path, name: str) -> bool:
+    """Whether a file of this name, or with the suffix, is in a folder, and nothing ships under the name alone."""
+    return name not in shipped_names() and any((folder / f"{name}{end}").is_file() for end in ("", ".yaml"))
 
 
 def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperiment | None:

@@ -303,3 +303,9 @@ def test_a_name_that_is_no_path_means_what_ships_or_stands_beside_the_file(
     (there / "e.yaml").write_text(text.replace("NAME", "yours"), encoding="utf-8")
     (finding,) = check(there / "e.yaml").diagnostics
     assert finding.code == "S504"
+    (there / "e.yaml").write_text(text.replace("NAME", "school/boxes"), encoding="utf-8")
+    assert check(there / "e.yaml").diagnostics == (), "what ships in a folder"
+    (there / "school").mkdir()
+    shutil.copy(shipped_folder() / "talkitout.yaml", there / "school" / "boxes.yaml")
+    ((name, *_),) = load_experiment(there / "e.yaml").named()
+    assert Path(name).is_relative_to(there)
