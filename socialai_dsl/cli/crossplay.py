@@ -4,14 +4,17 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.arguments import episodes
+from socialai_dsl.cli.arguments import TELL_OPTIONS, add_tell, episodes, typed_options
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options
 from socialai_dsl.cli.terminal import columns, json_text
 from socialai_dsl.evaluation.crossplay import CrossPlay
 from socialai_dsl.runs.crossplay import crossplay
 from socialai_dsl.runs.folder import CROSSPLAY
 
-SUMMARY: Final = "let trained agents, scripts and chance play with each other, everybody with everybody"
+SUMMARY: Final = (
+    "let agents, scripts, chance and language models play with each other, everybody with everybody"
+)
 _WIDTH: Final = 100  # characters of a line
 
 
@@ -21,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "players",
         nargs="+",
         metavar="PLAYER",
-        help="the folder of a run, a checkpoint, shipped:NAME, random, or oracle (each seat's own script)",
+        help="the folder of a run, a checkpoint, shipped:NAME, random, oracle (each seat's own script), or llm:MODEL",
     )
     parser.add_argument(
         "--on", required=True, metavar="SCENARIO", help="the scenario to play, with several seats"
@@ -40,11 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"write {CROSSPLAY} and a picture of the matrices there; `socialai report` takes this folder",
     )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    add_tell(parser)
+    add_options(parser)
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play, and print a matrix for each seat."""
-    found = crossplay(arguments.players, arguments.on, arguments.episodes, out=arguments.out)
+    typed = typed_options(arguments, (*TELL_OPTIONS, *MODEL_OPTIONS))
+    found = crossplay(arguments.players, arguments.on, arguments.episodes, out=arguments.out, **typed)
     if arguments.json:
         print(json_text(found.figures()))
         return Exit.GOOD

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.players import Player
+from socialai_dsl.episodes.players import MODEL_PREFIX, Player
 from socialai_dsl.episodes.results import EvalResult, interval_over_rooms
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.program_suite import seats_of
 from trainer.shipped import PREFIX
@@ -97,31 +98,44 @@ def _rate(won: NDArray[np.bool_]) -> Rate:
     return Rate(float(won.mean()), *interval_over_rooms(won))
 
 
-def cross_play(players: Sequence[Player], scenario: str, loaded: Loaded, episodes: int = 100) -> CrossPlay:
+def cross_play(
+    players: Sequence[Player], scenario: str, loaded: Loaded, episodes: int = 100, out: Path | None = None
+) -> CrossPlay:
     """Let everybody play with everybody, and with themselves, on the same test episodes.
 
     Args:
-        players: `random`, `oracle`, which is each seat's own script, or trained agents.
+        players: `random`, `oracle`, which is each seat's own script, trained agents, or language models.
         scenario: as it was asked for.
         loaded: the same.
         episodes: of each pair.
+        out: gets a folder for each pair with a language model, with its transcripts.
 
     Raises:
-        UsageError: the scenario has one seat, or a player does not fit it or cannot be asked here.
+        UsageError: the scenario has one seat, or a player does not fit it or cannot be asked here, or a language model
+            has no folder.
+        RunFailed: a language model has spent its budget of one pair.
     """
+    if out is None and any(player.is_model for player in players):
+        raise OptionError("out", "got none, expected a folder for the transcripts of language models")
     program = compiled(loaded)
     seats = seats_of(program)
     if len(seats) == 1:
         raise UsageError(
             f"{scenario}: only the agent has a seat; `seat: open` gives one to another member of the cast"
         )
-    results = {}
+    names, results = names_of(players), {}
     for one, other in np.ndindex(len(players), len(players)):
-        partners = dict.fromkeys(seats[1:], players[other])
+        place = None if out is None else out / _folder_name(f"{names[one]} with {names[other]}")
+        player, partner = (replace(players[number], out=place) for number in (one, other))
+        partners = dict.fromkeys(seats[1:], partner)
         results[one, other] = play_test_set(
-            players[one], scenario, loaded, program, episodes, partners=partners
+            player, scenario, loaded, program, episodes, partners=partners
         ).result
-    return CrossPlay(scenario, seats, tuple(names_of(players)), results)
+    return CrossPlay(scenario, seats, tuple(names), results)
+
+
+def _folder_name(pair: str) -> str:
+    return re.sub(r"[^\w.-]+", "_", pair).strip(".")
 
 
 def names_of(players: Sequence[Player]) -> list[str]:
@@ -142,4 +156,4 @@ def names_of(players: Sequence[Player]) -> list[str]:
 
 
 def _parts(agent: str) -> tuple[str, ...]:
-    return (agent,) if agent.startswith(PREFIX) else Path(agent).parts or (agent,)
+    return (agent,) if agent.startswith((PREFIX, MODEL_PREFIX)) else Path(agent).parts or (agent,)

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from socialai_dsl.checking.briefing import Briefing, brief
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.partners import partners_of, seating
+from socialai_dsl.episodes.partners import Partners, own_seat, partners_of, seating, sitting
 from socialai_dsl.episodes.players import HUMAN_FOLDER, Player, session_folder
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
@@ -62,16 +63,39 @@ def play_seed(
 
 
 def play_test_episodes(
-    player: Player, scenario: str, program: Playable, episodes: int, briefing: Briefing
+    player: Player,
+    partners: Partners,
+    scenario: str,
+    loaded: Loaded,
+    program: Playable,
+    episodes: int,
+    briefing: Briefing,
 ) -> "list[FinishedEpisode]":
-    """Let a person play test episodes until they quit, and keep everything in the session's folder."""
+    """Let a person play test episodes until they quit, and keep everything in the session's folder.
+
+    Args:
+        player: the person.
+        partners: who has other seats.
+        scenario: as it was asked for.
+        loaded: the same.
+        program: the same, compiled.
+        episodes: how many there are.
+        briefing: what they are told of the task.
+
+    Raises:
+        UsageError: there is no terminal, or a partner cannot sit there.
+    """
     from socialai_dsl.play import play
 
+    loaded, filled = seating(partners, scenario, loaded)
     session, name = player.kept_in, scenario_folder_name(scenario)
-    about = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
+    about: dict[str, Any] = {"session": session.name, "scenario": name, "program_sha256": program.sha256}
+    if partners:
+        about["seats"] = sitting(program, partners, own_seat(partners, program))
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
         title = f"test episode {number}" if player.view == "seat" else f"{name}, test episode {number}"
         return (title, {"options": {"test_episode": number}}) if number < episodes else None
 
-    return play(scenario, episode, session / name, about, briefing, player.view, practice=False)
+    folder = session / name
+    return play(scenario, episode, folder, about, briefing, player.view, False, seats=filled, loaded=loaded)

@@ -280,17 +280,13 @@ def play_test_set(
         RunFailed: a language model has spent its budget.
     """
     endings, briefing = endings_of(loaded, program), player.briefing(loaded)
-    if player.is_person:
-        person = play_test_episodes(player, scenario, program, episodes, briefing)
-        return _of_person(person, scenario, loaded, program, player, briefing)
     own = own_seat(partners, program)
+    if player.is_person:
+        person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing)
+        return _of_person(person, scenario, loaded, program, player, own, partners, briefing)
     if models := [one for one in (player, *partners.values()) if one.is_model]:
-        if player.is_model:  # on one seat alone
-            partners = {
-                seat: partners.get(seat) or Player("oracle" if has_script(program, seat) else NOBODY)
-                for seat in seats_of(program)
-                if seat != own
-            }
+        if player.is_model:  # which plays on one seat alone
+            partners = _with_idle(partners, own, program)
         players = {seat: partners.get(seat, player) for seat in seats_of(program)}
         place = models[0].kept_in
         played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials)
@@ -341,6 +337,15 @@ def trace_test_episodes(
     texts = {one.name: one.text for one in endings_of(loaded, program)}
     played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners)
     return played.traces(numbers, texts), playing.told
+
+
+def _with_idle(partners: Partners, own: Seat, program: Playable) -> Partners:
+    """Who has all seats but the own one, where nobody was named their scripts."""
+    return {
+        seat: partners.get(seat) or Player("oracle" if has_script(program, seat) else NOBODY)
+        for seat in seats_of(program)
+        if seat != own
+    }
 
 
 def _playing(
@@ -458,7 +463,16 @@ def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
         raise UsageError(f"{run}: holds no session of a person ({error})") from None
     if about.get("program_sha256") != program.sha256:
         raise UsageError(f"{run} holds episodes of another version of the scenario")
-    return _of_person(played[:most], scenario, loaded, program, Player("human", out=run.parent))
+    partners = {seat: _seated(word) for seat, word in about.get("seats", {}).items()}
+    return _of_person(
+        played[:most],
+        scenario,
+        loaded,
+        program,
+        Player("human", out=run.parent),
+        about.get("seat", AGENT),
+        partners,
+    )
 
 
 def _of_person(
@@ -467,6 +481,8 @@ def _of_person(
     loaded: Loaded,
     program: Playable,
     player: Player,
+    own: Seat,
+    partners: Partners,
     briefing: Briefing = NO_BRIEFING,
 ) -> Evaluation:
     if not played:
@@ -479,12 +495,23 @@ def _of_person(
         np.array([p.reward for p in played]),
         names,
     )
-    actions = {number: p.actions for number, p in enumerate(played)}
+    actions = {number: _of_all_seats(p, own, program) for number, p in enumerate(played)}
     endings = endings_of(loaded, program)
     # A person remembers every episode of the session.
-    return Evaluation(
-        scenario, loaded, program, player, result, endings, actions, trials=len(played), briefing=briefing
-    )
+    found = Evaluation(scenario, loaded, program, player, result, endings, actions, trials=len(played))
+    return replace(found, briefing=briefing, seat=own, partners=_with_idle(partners, own, program))
+
+
+def _of_all_seats(played: "FinishedEpisode", own: Seat, program: Playable) -> list[NDArray[np.int64]]:
+    """What was done on all seats in each step, int64 (S, heads); of one seat the actions themselves."""
+    seats = seats_of(program)
+    if len(seats) == 1:
+        return played.actions
+    done = {own: played.actions, **played.others}
+    nothing = np.zeros_like(played.actions[0])
+    nothing[0] = len(program.actions)
+    still = [nothing] * len(played.actions)
+    return [np.stack(step) for step in zip(*(done.get(seat, still) for seat in seats), strict=True)]
 
 
 def _some_of(successes: int, episodes: int) -> dict[str, Any]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from socialai_dsl.atomic import write_json
-from socialai_dsl.episodes.players import Agent, require_trainer
-from socialai_dsl.errors import UsageError
+from socialai_dsl.episodes.players import MODEL_PREFIX, Agent, require_trainer
+from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.crossplay import CrossPlay, cross_play
 from socialai_dsl.frontend import load
 from socialai_dsl.runs.evaluate import made_player
@@ -20,25 +20,39 @@ PICTURE: Final = "crossplay"
 
 
 def crossplay(
-    agents: Sequence[Agent], scenario: str, episodes: int = 100, *, out: str | Path | None = None
+    agents: Sequence[Agent],
+    scenario: str,
+    episodes: int = 100,
+    *,
+    out: str | Path | None = None,
+    **options: Any,
 ) -> CrossPlay:
     """Let everybody play with everybody, and with themselves, as `socialai crossplay` does.
 
     Args:
-        agents: `random`, `oracle` (each seat's own script), runs and checkpoints; see `evaluate`.
+        agents: `random`, `oracle` (each seat's own script), runs, checkpoints and `llm:MODEL`; see `evaluate`.
         scenario: a path or a name, with several seats.
         episodes: of each pair.
         out: a folder that gets the figures as `crossplay.json`, and a picture of them as PNG and SVG; reports take it.
+            Language models need one: each pair with one has its transcripts there, in a folder of its own.
+        options: of language models, see `evaluate`; a budget is that of a pair.
 
     Raises:
         ScenarioError: the scenario has mistakes.
         UsageError: it has one seat, or an agent cannot play here, or a library is missing (a ValueError).
+        RunFailed: a language model has spent its budget of a pair.
         OSError: a file cannot be written.
     """
-    players = [made_player(agent, [scenario], {}, None) for agent in agents]
-    if any(player.is_model or player.is_person for player in players):
+    models = [isinstance(agent, str) and agent.startswith(MODEL_PREFIX) for agent in agents]
+    if options and not any(models):
+        raise OptionError(min(options), "it is for language models, and none plays")
+    players = [
+        made_player(agent, [scenario], options if is_model else {}, None)
+        for agent, is_model in zip(agents, models, strict=True)
+    ]
+    if any(player.is_person for player in players):
         raise UsageError(
-            "crossplay: got a language model or a person; expected random, oracle, a run or a checkpoint"
+            "crossplay: got a person; expected random, oracle, a run, a checkpoint or a language model"
         )
     if any(player.is_trained for player in players):
         require_trainer()
@@ -46,7 +60,7 @@ def crossplay(
         return cross_play(players, scenario, load(scenario), episodes)
     require_libraries("matplotlib")
     with new_folders(Path(out)):
-        found = cross_play(players, scenario, load(scenario), episodes)
+        found = cross_play(players, scenario, load(scenario), episodes, Path(out))
         write(found, Path(out))
     return found
 

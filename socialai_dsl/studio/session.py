@@ -366,7 +366,7 @@ class Session:
         self._loaded, self._gaze, self._game, self._casting = loaded, None, (stage, tracing), casting
         self._others, self._policy, self._prepared = others, policy, False
         self._phrases = Phrases(program.actions, program.sentences)
-        self._text_view, self._briefing = TextView(program, "grid"), brief(loaded)
+        self._text_view, self._briefing = TextView(program, "grid", seat=stage.own), brief(loaded)
 
     def _usual(self, program: Playable, casting: Casting) -> dict[Seat, str]:
         """Who plays other seats than the own one unless something else is said."""

@@ -11,6 +11,7 @@ from socialai_dsl.cli.main import main
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.evaluation.crossplay import names_of
 from socialai_dsl.runs.folder import CROSSPLAY
+from tests.socialai_dsl.llm.endpoint import endpoint
 
 SCENARIO = "together/levers_together"
 
@@ -38,6 +39,33 @@ def test_scripts_play_with_each_other_and_chance_with_nobody(
     assert f"with themselves {alone['success']:.2f} [{low:.2f}, {high:.2f}]" in printed
     assert (out / "crossplay.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "crossplay.svg").is_file()
+
+
+def test_language_models_play_with_everybody_and_go_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each pair has transcripts of its own, which are played again without asking; the first attempt ends early."""
+    pytest.importorskip("httpx", reason="language models need the extra llm")
+    with endpoint(lambda request: "Act: left" if request["model"] == "a" else "Act: done") as stub:
+        command = ["crossplay", "oracle", "llm:a", "llm:org/b", "--on", SCENARIO, "--episodes", "2"]
+        command += ["--base-url", stub.url, "--out", str(tmp_path / "there")]
+        assert main([*command, "--budget", "100"]) == 4
+        asked = len(stub.requests)
+        assert asked > 0
+        assert main([*command, "--budget", "100_000"]) == 0
+        whole = len(stub.requests)
+        assert main(command) == 0
+        assert len(stub.requests) == whole
+    figures = json.loads((tmp_path / "there" / CROSSPLAY).read_text(encoding="utf-8"))
+    assert figures["players"] == ["script", "llm:a", "llm:org/b"]
+    rates = {(c["agent"], c["others"]): c["success"] for c in figures["seats"]["agent"]["cells"]}
+    assert rates.pop(("script", "script")) == 1
+    assert set(rates.values()) == {0}
+    episodes = list((tmp_path / "there").glob("*/levers_together/transcripts/**/episode-*.jsonl"))
+    assert len(episodes) == 2 * (4 * 1 + 4 * 2), (
+        "two models play with the script on either seat, and four pairs"
+    )
+    capsys.readouterr()
 
 
 def test_the_figures_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -69,7 +97,12 @@ def test_nothing_is_left_of_what_cannot_be_played(tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["random", "--on", "talkitout"], "only the agent has a seat"),
-        (["human", "--on", SCENARIO], "expected random, oracle, a run or a checkpoint"),
+        (["human", "--on", SCENARIO], "expected random, oracle, a run, a checkpoint or a language model"),
+        (["llm:stub", "--on", SCENARIO], "--out: got none, expected a folder for the transcripts"),
+        (
+            ["random", "--on", SCENARIO, "--budget", "5"],
+            "--budget: it is for language models, and none plays",
+        ),
         (["nowhere", "--on", SCENARIO], "nowhere"),
     ],
 )
