@@ -10,6 +10,7 @@ from socialai_dsl.checking.briefing import brief
 from socialai_dsl.cli.arguments import (
     TELL_OPTIONS,
     add_scenario,
+    add_seats,
     add_tell,
     port,
     positive,
@@ -47,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=port, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
     add_option(parser, "style")
+    add_seats(parser, "; clients have the first seat that is left")
     add_tell(parser)
     parser.add_argument(
         "--sessions",
@@ -67,19 +69,17 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Serve until interrupted."""
     if find_spec("openenv") is None:
         raise UsageError("serving OpenEnv needs openenv: pip install 'socialai-dsl[openenv]'")
-    import socialai_dsl
-
-    loaded = socialai_dsl.load(arguments.scenario)
-    program = socialai_dsl.compile(loaded)
-    briefing = brief(loaded, **typed_options(arguments, TELL_OPTIONS))
     import uvicorn
 
+    from socialai_dsl.episodes.partners import beside
     from socialai_dsl.llm.gate import IDLE, MOST_BYTES
     from socialai_dsl.llm.openenv import application
 
+    played = beside(arguments.seat, arguments.scenario)
+    briefing = brief(played.loaded, **typed_options(arguments, TELL_OPTIONS))
     hosts = [arguments.host, *arguments.allow]
     app = application(
-        program, arguments.style or "prose", briefing, arguments.sessions, hosts, arguments.idle or IDLE
+        played, arguments.style or "prose", briefing, arguments.sessions, hosts, arguments.idle or IDLE
     )
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
     try:
@@ -89,7 +89,9 @@ def execute(arguments: argparse.Namespace) -> Exit:
     with listening:
         address, number = listening.getsockname()[:2]
         shown = f"[{address}]" if ":" in address else address
-        print(f"{program.name} at http://{shown}:{number}, Ctrl-C stops it", file=sys.stderr, flush=True)
+        print(
+            f"{played.program.name} at http://{shown}:{number}, Ctrl-C stops it", file=sys.stderr, flush=True
+        )
         config = uvicorn.Config(app, log_level="warning", ws_max_size=MOST_BYTES)
         uvicorn.Server(config).run(sockets=[listening])
     return Exit.GOOD

@@ -22,6 +22,7 @@ from socialai_dsl.episodes.players import Player, make_policy, named_agent, requ
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.scripts import with_script
 from socialai_dsl.errors import OptionError, UsageError
+from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable, has_script, seats_of
 from socialai_dsl.source import Source
 from socialai_dsl.traces.endings import short_name
@@ -135,10 +136,54 @@ def seating(
         return loaded, None
     if AGENT in partners and partners[AGENT].is_script:
         loaded = with_script(scenario, loaded, texts).loaded
-    program = compiled(loaded)
+    return loaded, _filled(partners, compiled(loaded))
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What one plays who plays alone beside partners, in any number of environments.
+
+    Attributes:
+        loaded: the scenario, or its variant `oracle` where a script plays the agent.
+        program: the same, compiled.
+        partners: of other seats; the rest follow their scripts.
+    """
+
+    loaded: Loaded
+    program: Playable
+    partners: Partners
+
+    def seats(self) -> dict[Seat, str | Policy] | None:
+        """Who fills the other seats of one more environment, as `make` takes it; None where nobody was named.
+
+        Raises:
+            UsageError: see `seating`.
+        """
+        return _filled(self.partners, self.program) if self.partners else None
+
+
+def beside(named: Named, scenario: str) -> Beside:
+    """What one plays beside these.
+
+    Args:
+        named: who has other seats.
+        scenario: a path or a name.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: see `partners_of` and `seating`.
+    """
+    loaded = load(scenario)
+    partners = partners_of(named, scenario, compiled(loaded))
+    played, _ = seating(partners, scenario, loaded)
+    return Beside(played, compiled(played), partners)
+
+
+def _filled(partners: Partners, program: Playable) -> dict[Seat, str | Policy]:
+    """What fills the seats of partners in an environment of a program. Raises UsageError as `seating` does."""
     env = make(program)
     try:
-        return loaded, {seat: _filling(player, seat, program, env) for seat, player in partners.items()}
+        return {seat: _filling(player, seat, program, env) for seat, player in partners.items()}
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:

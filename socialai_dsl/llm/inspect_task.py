@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Final, Literal
 
@@ -12,8 +13,7 @@ from inspect_ai.scorer import Score, Scorer, Target, mean, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from socialai_dsl.checking.briefing import Tell, brief
-from socialai_dsl.envs.factory import compiled
-from socialai_dsl.frontend import load
+from socialai_dsl.episodes.partners import beside
 from socialai_dsl.llm.episode import CONTEXT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.view import Style, TextView
@@ -34,6 +34,7 @@ def scenario(
     tell: Tell | None = None,
     goal: str = "",
     language: str | None = None,
+    seats: Mapping[str, str] | None = None,
 ) -> Task:
     """Test episodes 0 to `episodes - 1` of a scenario, a sample each.
 
@@ -48,6 +49,8 @@ def scenario(
             if one is given, else the instructions if there are some.
         goal: a sentence about the aim.
         language: of the instructions, such as `de`; None: the one written first.
+        seats: of several, who plays which: `{"jill": "script"}`, `random`, or the path of a trained agent; the model
+            has the first that is left.
 
     Raises:
         ScenarioError: the scenario does not exist, or has mistakes.
@@ -56,10 +59,15 @@ def scenario(
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
     left_out((), history)  # a limit that is none is told before anything is played
-    loaded = load(scenario)
-    program, briefing = compiled(loaded), brief(loaded, tell, goal, language)
-    options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid, "briefing": briefing}
-    beginning = Episode(program, **options)
+    played = beside(list((seats or {}).items()), scenario)
+    options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid}
+    briefing = brief(played.loaded, tell, goal, language)
+
+    def episode() -> Episode:
+        seated = played.seats()
+        return Episode(played.program, briefing=briefing, seats=seated, loaded=played.loaded, **options)
+
+    beginning = episode()
     samples = [
         Sample(
             id=number,
@@ -71,14 +79,15 @@ def scenario(
     ]
     return Task(
         dataset=MemoryDataset(samples, name=scenario),
-        solver=player(lambda: Episode(program, **options), history),
+        solver=player(episode, history),
         scorer=outcome(),
         version=TextView.version,
         metadata={
             "scenario": scenario,
-            "program_sha256": program.sha256,
+            "program_sha256": played.program.sha256,
             "text": TextView.version,
             **briefing.record(),
+            **({"seat": beginning.seat, "seats": dict(seats)} if seats else {}),
         },
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from secrets import randbelow
 from typing import Any, ClassVar
 
@@ -23,6 +23,8 @@ from openenv.core.env_server.types import (
 from pydantic import Field, model_validator
 
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
+from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.episodes.partners import Beside
 from socialai_dsl.llm.episode import Episode
 from socialai_dsl.llm.gate import IDLE, Gate
 from socialai_dsl.llm.view import Style, TextView
@@ -75,14 +77,23 @@ class ScenarioEnvironment(Environment[Reply, TextObservation, Progress]):
         program: of a scenario or suite.
         style: how observations are written.
         briefing: what the instructions say of the task.
+        seats: who fills other seats, as `make` takes it.
+        loaded: what the program was made of; of several players one is told its name then.
     """
 
     SUPPORTS_CONCURRENT_SESSIONS: ClassVar[bool] = True
 
-    def __init__(self, program: Playable, style: Style, briefing: Briefing = NO_BRIEFING) -> None:
+    def __init__(
+        self,
+        program: Playable,
+        style: Style,
+        briefing: Briefing = NO_BRIEFING,
+        seats: Mapping[str, Any] | None = None,
+        loaded: Loaded | None = None,
+    ) -> None:
         super().__init__()
         self._name = program.name
-        self._episode = Episode(program, style, briefing=briefing)
+        self._episode = Episode(program, style, briefing=briefing, seats=seats, loaded=loaded)
         self._id: str | None = None
         self._seed: int | None = None
         self._test_episode: int | None = None
@@ -170,7 +181,7 @@ class ScenarioClient(EnvClient[Reply, TextObservation, Progress]):
 
 
 def application(
-    program: Playable,
+    played: Beside,
     style: Style = "prose",
     briefing: Briefing = NO_BRIEFING,
     sessions: int = 100,
@@ -180,7 +191,7 @@ def application(
     """The server of a scenario or suite.
 
     Args:
-        program: its program.
+        played: the scenario, and who has other seats of it, as `beside` gives it.
         style: how observations are written, see `TextView`.
         briefing: what the instructions say of the task, see `brief`; by default nothing.
         sessions: how many may play at once.
@@ -189,7 +200,7 @@ def application(
     """
     limits = ConcurrencyConfig(max_concurrent_envs=sessions, session_timeout=idle)
     app = create_fastapi_app(
-        lambda: ScenarioEnvironment(program, style, briefing),
+        lambda: ScenarioEnvironment(played.program, style, briefing, played.seats(), played.loaded),
         Reply,
         TextObservation,
         concurrency_config=limits,

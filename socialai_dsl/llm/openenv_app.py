@@ -1,14 +1,15 @@
 """The application that `openenv.yaml` names: it serves the scenario of the environment variable `SCENARIO`.
 
-`ALLOW` has further names under which it may be asked, with commas between them.
+`ALLOW` has further names under which it may be asked, with commas between them; `SEATS`, likewise, who plays which of
+several seats: `jill=script`.
 """
 
 import os
 
 from socialai_dsl.checking.briefing import brief
-from socialai_dsl.envs.factory import compiled
-from socialai_dsl.frontend import load
+from socialai_dsl.episodes.partners import beside
 from socialai_dsl.llm.openenv import application
 
-loaded = load(os.environ.get("SCENARIO", "talkitout"))
-app = application(compiled(loaded), briefing=brief(loaded), hosts=os.environ.get("ALLOW", "").split(","))
+seats = [pair.partition("=")[::2] for pair in filter(None, os.environ.get("SEATS", "").split(","))]
+played = beside(seats, os.environ.get("SCENARIO", "talkitout"))
+app = application(played, briefing=brief(played.loaded), hosts=os.environ.get("ALLOW", "").split(","))

@@ -8,7 +8,8 @@ from inspect import Parameter, Signature
 from typing import Any, ClassVar, Final, Literal
 
 from socialai_dsl.checking.briefing import Briefing, Tell, brief
-from socialai_dsl.envs.factory import Scenario, load_playable
+from socialai_dsl.envs.factory import Scenario
+from socialai_dsl.episodes.partners import Beside, beside
 from socialai_dsl.llm.actions import ActionLanguage, ToolCall
 from socialai_dsl.llm.episode import TEST_SET, Episode
 from socialai_dsl.llm.view import Style
@@ -26,9 +27,13 @@ class SocialEnv:
     _program: ClassVar[Playable]
     _style: ClassVar[Style]
     _briefing: ClassVar[Briefing]
+    _beside: ClassVar[Beside | None]
 
     def __init__(self) -> None:
-        self._episode = Episode(self._program, self._style, mode="tools", briefing=self._briefing)
+        seats, loaded = (None, None) if self._beside is None else (self._beside.seats(), self._beside.loaded)
+        self._episode = Episode(
+            self._program, self._style, "tools", briefing=self._briefing, seats=seats, loaded=loaded
+        )
         self._done = True
 
     def reset(self, seed: int | None = None, test_episode: int | None = None, **_: Any) -> str:
@@ -68,6 +73,7 @@ def social_env(
     tell: Tell | None = None,
     goal: str = "",
     language: str | None = None,
+    seats: Mapping[str, str] | None = None,
 ) -> type[SocialEnv]:
     """The environment class of a scenario for TRL: `GRPOTrainer(..., environment_factory=social_env("talkitout"))`.
 
@@ -78,14 +84,23 @@ def social_env(
             if one is given, else the instructions if there are some. A program has none.
         goal: a sentence about the aim.
         language: of the instructions, such as `de`; None: the one written first.
+        seats: of several, who plays which: `{"jill": "script"}`, `random`, or the path of a trained agent; the model
+            has the first that is left.
 
     Raises:
         ScenarioError: the scenario has mistakes.
-        ValueError: there is nothing of that kind to be told.
+        ValueError: there is nothing of that kind to be told, or somebody cannot sit there, beside a program nobody.
     """
-    program, loaded = load_playable(scenario)
+    if isinstance(scenario, Playable):
+        if seats:
+            raise ValueError("seats: got some for a program, expected the path or name of its scenario")
+        played, program, loaded = None, scenario, None
+    else:
+        played = beside(list((seats or {}).items()), str(scenario))
+        program, loaded = played.program, played.loaded
     tools = [tool["function"] for tool in ActionLanguage(program).tools()]
-    content = {"_program": program, "_style": style, "_briefing": brief(loaded, tell, goal, language)}
+    briefing = brief(loaded, tell, goal, language)
+    content = {"_program": program, "_style": style, "_briefing": briefing, "_beside": played}
     # Rewards are logged under the name of the class.
     return type(program.name, (SocialEnv,), {**content, **{tool["name"]: _method(tool) for tool in tools}})
 

@@ -104,3 +104,10 @@ def test_a_history_is_a_number_of_observations() -> None:
 def test_a_scenario_that_is_not_there_is_told_of() -> None:
     with pytest.raises(Exception, match="there is no scenario `talkitour`"):
         run(lambda _: "Act: left", scenario="talkitour")
+
+
+def test_a_seat_beside_others_is_played() -> None:
+    log = run(lambda _: "Act: left", scenario="together/help_together", episodes=2, seats={"agent": "script"})
+    assert log.status == "success", log.error
+    assert (log.eval.metadata["seat"], log.eval.metadata["seats"]) == ("jill", {"agent": "script"})
+    assert "You are Jill, one of two players" in log.samples[0].messages[0].text

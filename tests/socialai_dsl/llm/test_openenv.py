@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import socialai_dsl as sd
 from socialai_dsl.cli.main import main
+from socialai_dsl.episodes.partners import beside
 from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import scripted_reply
 
@@ -58,15 +58,15 @@ def url() -> Iterator[str]:
 
 
 def test_a_client_plays_an_episode_to_its_end(url: str) -> None:
-    beside = Episode("talkitout+oracle")
-    text = beside.reset(test_episode=3)
+    alike = Episode("talkitout+oracle")
+    text = alike.reset(test_episode=3)
     with ScenarioClient(base_url=url).sync() as client:
         told = client.reset(test_episode=3).observation
-        assert (told.text, told.instructions) == (text, beside.instructions)
+        assert (told.text, told.instructions) == (text, alike.instructions)
         done = False
         while not done:
-            reply = scripted_reply(beside)
-            turn = beside.step(reply)
+            reply = scripted_reply(alike)
+            turn = alike.step(reply)
             result = client.step(Reply(message=reply))
             assert (result.observation.text, result.reward, result.done) == (
                 turn.text,
@@ -74,9 +74,9 @@ def test_a_client_plays_an_episode_to_its_end(url: str) -> None:
                 turn.done,
             )
             done = result.done
-        assert (result.observation.success, result.observation.ending) == (True, beside.result().ending)
+        assert (result.observation.success, result.observation.ending) == (True, alike.result().ending)
         state = client.state()
-        assert (state.step_count, state.test_episode, state.invalid_replies) == (beside.result().steps, 3, 0)
+        assert (state.step_count, state.test_episode, state.invalid_replies) == (alike.result().steps, 3, 0)
         with pytest.raises(Exception, match="after the end of the episode"):
             client.step(Reply(message="Act: left"))
         with pytest.raises(Exception, match="seed: got -1, expected a number greater than or equal to 0"):
@@ -90,7 +90,7 @@ def test_the_metadata_have_the_version_of_the_text(url: str) -> None:
 
 def served(idle: float = 60.0, sessions: int = 100, **options: Any) -> AbstractContextManager[str]:
     """A server of `talkitout` and its address."""
-    return serving(application(sd.compile(sd.load("talkitout")), idle=idle, sessions=sessions, **options))
+    return serving(application(beside([], "talkitout"), idle=idle, sessions=sessions, **options))
 
 
 def test_strangers_are_refused(url: str) -> None:

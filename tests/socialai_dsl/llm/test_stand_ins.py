@@ -16,6 +16,7 @@ from starlette.websockets import WebSocketDisconnect
 import socialai_dsl.llm as llm
 from socialai_dsl.checking.briefing import brief
 from socialai_dsl.envs.factory import compiled, playable_of
+from socialai_dsl.episodes.partners import beside
 from socialai_dsl.frontend import load
 from socialai_dsl.llm import Episode
 from tests.socialai_dsl.llm.stand_ins import OPENENV, Model, TaskState, inspect_ai
@@ -30,13 +31,17 @@ NAME = "testserver"  # how the client calls a server
 
 @contextmanager
 def imported(name: str, stand_ins: dict[str, ModuleType]) -> Iterator[Any]:
-    """One of our modules, with stand-ins of what it imports; afterwards all is as it was."""
+    """One of our modules, with stand-ins of what it imports; afterwards all of these are as they were.
+
+    Other libraries that were imported meanwhile stay, since some cannot be imported twice.
+    """
     before = dict(sys.modules)
     sys.modules.update(stand_ins)
     try:
         yield import_module(f"socialai_dsl.llm.{name}")
     finally:
-        sys.modules.clear()
+        for made in [*stand_ins, *(one for one in sys.modules if one.startswith("socialai_dsl.llm."))]:
+            del sys.modules[made]
         sys.modules.update(before)
         vars(llm).pop(name, None)
 
@@ -49,11 +54,11 @@ def openenv() -> Iterator[Any]:
 
 @pytest.fixture
 def client(openenv: Any) -> TestClient:
-    return TestClient(openenv.application(playable_of("talkitout"), hosts=[NAME], idle=0.5))
+    return TestClient(openenv.application(beside([], "talkitout"), hosts=[NAME], idle=0.5))
 
 
 def test_a_session_plays_an_episode(client: TestClient) -> None:
-    beside = Episode("talkitout")
+    alike = Episode("talkitout")
     with client.websocket_connect("/ws") as session:
 
         def say(kind: str, **data: Any) -> Any:
@@ -63,13 +68,13 @@ def test_a_session_plays_an_episode(client: TestClient) -> None:
         assert "expected a reset first" in say("step", message="Act: left")["message"]
         assert "seed: got -1" in say("reset", seed=-1)["message"]
         told = say("reset", seed=7)["observation"]
-        assert (told["text"], told["instructions"]) == (beside.reset(seed=7), beside.instructions)
+        assert (told["text"], told["instructions"]) == (alike.reset(seed=7), alike.instructions)
         for reply in ("Act: left", '{"move": "left"}', "hm", "Act: done"):
-            turn, told = beside.step(reply), say("step", message=reply)
+            turn, told = alike.step(reply), say("step", message=reply)
             assert (told["observation"]["text"], told["done"]) == (turn.text, turn.done)
         assert (told["observation"]["success"], told["observation"]["ending"]) == (
             False,
-            beside.result().ending,
+            alike.result().ending,
         )
         state = say("state")
         assert (state["seed"], state["step_count"], state["invalid_replies"]) == (7, 4, 1)
@@ -95,6 +100,23 @@ def test_a_session_is_told_of_the_task(openenv: Any) -> None:
         env = openenv.ScenarioEnvironment(compiled(loaded), "prose", briefing)
         assert env.reset(seed=7).instructions.endswith(briefing.text())
         env.close()
+
+
+def test_a_session_of_several_players_is_of_the_seat_that_is_left(openenv: Any) -> None:
+    alike = Episode("together/help_together+oracle", seats={"agent": "script"})
+    client = TestClient(
+        openenv.application(beside([("agent", "script")], "together/help_together"), hosts=[NAME])
+    )
+    with client.websocket_connect("/ws") as session:
+        session.send_json({"type": "reset", "data": {"test_episode": 3}})
+        told = session.receive_json()["data"]["observation"]
+        assert told["text"] == alike.reset(test_episode=3)
+        assert "You are Jill, one of two players" in told["instructions"]
+        for reply in ("Act: forward", 'Act: say "Move your body"'):
+            session.send_json({"type": "step", "data": {"message": reply}})
+            assert session.receive_json()["data"]["observation"]["text"] == alike.step(reply).text
+    with pytest.raises(ValueError, match="got 'llm:other' for jill, expected script, random"):
+        beside([("jill", "llm:other")], "together/help_together")
 
 
 def test_a_session_that_lost_its_place_says_so(openenv: Any) -> None:
@@ -139,6 +161,26 @@ def test_a_sample_is_played_to_its_end() -> None:
     assert (found["replies"], found["invalid"], found["stopped"], found["steps"]) == (5, 2, 1, 5)
     assert model.asked[0][1].text == Episode("talkitout").reset(test_episode=0)
     assert [len(messages) for messages in model.asked] == [2, 4, 6, 8, 10, 2], "the whole episode"
+
+
+@pytest.mark.skipif(
+    find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
+)
+def test_a_sample_of_several_players_is_of_the_seat_that_is_left() -> None:
+    model = Model([])
+    with imported("inspect_task", inspect_ai(model)) as module:
+        task = module.scenario("together/help_together", episodes=1, seats={"agent": "script"})
+        assert (task.metadata["seat"], task.metadata["seats"]) == ("jill", {"agent": "script"})
+        state = TaskState(task.dataset[0].metadata)
+        asyncio.run(task.solver(state, None))
+        alike = Episode("together/help_together+oracle", seats={"agent": "script"})
+        text = alike.reset(test_episode=0)
+        assert [message.text for message in model.asked[0]] == [alike.instructions, text]
+        for told in model.asked[1:]:
+            assert told[-1].text == alike.step("Act: done").text
+        assert asyncio.run(task.scorer(state, None)).metadata["steps"] == len(model.asked)
+        with pytest.raises(ValueError, match="got 'jil', expected one of agent, jill"):
+            module.scenario("together/help_together", seats={"jil": "script"})
 
 
 @pytest.mark.skipif(

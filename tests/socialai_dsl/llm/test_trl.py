@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.checking.briefing import UNTOLD
+from socialai_dsl.envs.factory import playable_of
 from socialai_dsl.llm import ActionLanguage, Episode
 from socialai_dsl.llm.episode import scripted_reply
 from socialai_dsl.llm.trl import social_env
@@ -50,6 +51,17 @@ def calls_of(language: ActionLanguage, reply: str) -> list[tuple[str, dict[str, 
             if template.replace("<noun>", noun) == action.sentence:
                 return [("say", {"template": template, "noun": noun, **direction})]
     raise AssertionError(action)
+
+
+def test_one_plays_the_seat_that_is_left() -> None:
+    env = social_env("together/help_together", seats={"agent": "script"})()
+    told = env.reset(test_episode=3)
+    assert "You are Jill, one of two players" in told
+    alike = Episode("together/help_together+oracle", mode="tools", seats={"agent": "script"})
+    assert told.endswith(alike.reset(test_episode=3))
+    assert env.move(direction="left") == alike.step("Act: left").text  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match="seats: got some for a program"):
+        social_env(playable_of("together/help_together"), seats={"agent": "script"})
 
 
 def test_what_is_told_of_the_task(signal: Path) -> None:
