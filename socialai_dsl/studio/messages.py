@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from socialai_dsl.traces.document import Trace
+from socialai_dsl.traces.document import Sight, Trace
 
 LARGEST_MESSAGE: Final = 2 << 20
 """Characters of a message from a window; longer ones are refused."""
@@ -95,19 +95,46 @@ class Show(_Message):
     shown: Shown
 
 
+_Acts = dict[_Word, list[_Number]]
+
+
 class Act(_Message):
-    """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
+    """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it.
+
+    Attributes:
+        acts: what people on other seats do, as `Chosen` has it.
+        stands_in: whether the script of the own seat plays instead, if there is one.
+    """
 
     do: Literal["act"]
     movement: _Word | None = None
     sentence: _Word | None = None
     line: _Word | None = None
+    acts: _Acts = {}
+    stands_in: bool = False
 
 
 class Auto(_Message):
-    """Let the chosen player play a step."""
+    """Let the chosen player play a step; `acts` as of `Act`."""
 
     do: Literal["auto"]
+    acts: _Acts = {}
+
+
+class Choose(_Message):
+    """Ask for the action that words mean, as those of `Act`."""
+
+    do: Literal["choose"]
+    movement: _Word | None = None
+    sentence: _Word | None = None
+    line: _Word | None = None
+
+
+class Glance(_Message):
+    """Ask what a person on another seat gets now."""
+
+    do: Literal["glance"]
+    seat: _Word
 
 
 class Back(_Message):
@@ -185,6 +212,8 @@ _GameQuestion = (
     | Show
     | Act
     | Auto
+    | Choose
+    | Glance
     | Back
     | Place
     | Look
@@ -201,6 +230,18 @@ QUESTIONS: Final[TypeAdapter[Question]] = TypeAdapter(Question)
 
 
 # -- what a window asks the server ------------------------------------------------------------------------------------
+
+
+class Invite(_Message):
+    """Ask for the code of a link to a seat of this window's game.
+
+    Attributes:
+        seconds: how long those who have chosen wait for the others before a step; None: for ever.
+    """
+
+    do: Literal["invite"]
+    seat: _Word
+    seconds: Annotated[float, Field(ge=1, le=3600)] | None = None
 
 
 class Hello(_Message):
@@ -303,12 +344,27 @@ class Explain(_Message):
 
 
 FileQuestion = (
-    Hello | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add | Explain
+    Hello | Invite | List | Read | Save | KeepDraft | TakeDraft | DiscardDraft | Copy | Create | Add | Explain
 )
 WINDOW_QUESTIONS: Final[TypeAdapter[Any]] = TypeAdapter(
     Annotated[_GameQuestion | FileQuestion, Field(discriminator="do")]
 )
 """What a window may ask."""
+
+
+# -- what nobody has asked for ----------------------------------------------------------------------------------------
+
+
+class Guests(_Message):
+    """Who has chosen what to do in the next step.
+
+    Attributes:
+        chosen: of each other seat that a person has. own: the one whose window the game is.
+    """
+
+    do: Literal["guests"]
+    chosen: dict[str, bool]
+    own: bool
 
 
 # -- what a process answers -------------------------------------------------------------------------------------------
@@ -467,6 +523,39 @@ class Stepped(_Message):
     seat: Seat
 
 
+class Chosen(_Message):
+    """The action that words mean."""
+
+    do: Literal["choose"]
+    action: list[int]
+
+
+class Glanced(_Message):
+    """What a person on another seat than the window's gets, and nothing else.
+
+    Attributes:
+        told, seen, compass: as those of `Seat`. seat: whose. name: how others call the person.
+        t: how many steps were played. facing: where it looks, by the compass. view: what it sees.
+        heard: all lines since the beginning.
+        success: whether the episode was the seat's success; None until it has ended.
+        actions, phrases: what can be done and said.
+    """
+
+    do: Literal["glance"]
+    told: str
+    seen: str
+    compass: bool
+    seat: str
+    t: int
+    name: str
+    facing: int
+    view: Sight
+    heard: list[str]
+    success: bool | None
+    actions: list[str]
+    phrases: list[str]
+
+
 class WentBack(_Message):
     """How many steps are left."""
 
@@ -546,6 +635,8 @@ Answer = Annotated[
     | Drawn
     | Begun
     | Stepped
+    | Chosen
+    | Glanced
     | WentBack
     | Looked
     | LayoutOf

@@ -19,11 +19,13 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from socialai_dsl.studio import MOST_WINDOWS
+from socialai_dsl.studio.connection import close
 from socialai_dsl.studio.engine import EngineLostError, start_worker
 from socialai_dsl.studio.files import Folder
 from socialai_dsl.studio.language import serve_editor
 from socialai_dsl.studio.messages import LARGEST_MESSAGE
-from socialai_dsl.studio.window import Window, Windows, close
+from socialai_dsl.studio.sharing import NO_GAME, Invitations
+from socialai_dsl.studio.window import Window, Windows
 from socialai_dsl.studio.worker import answer_window, serve_language
 from socialai_dsl.traces.scripts import static_text
 
@@ -32,7 +34,16 @@ LARGEST_FRAME: Final = 32 * LARGEST_MESSAGE
 WRONG_TOKEN: Final = 4403
 NO_ROOM: Final = 4429
 _LOOPBACK: Final = ("127.0.0.1", "::1")
-_OWN: Final = ("editor.js", "found.js", "line.js", "parts.js", "studio.css", "studio.js", "writing.js")
+_OWN: Final = (
+    "editor.js",
+    "found.js",
+    "guest.js",
+    "line.js",
+    "parts.js",
+    "studio.css",
+    "studio.js",
+    "writing.js",
+)
 _SHARED: Final = ("dom.js", "panels.js", "room.js", "tiles.js", "trace.js", "pages.css")
 _PAGE: Final = """<!doctype html>
 <html lang="en">
@@ -47,7 +58,7 @@ _PAGE: Final = """<!doctype html>
 </head>
 <body data-root="{root}" data-open="{opened}">
 <noscript>The studio needs scripts.</noscript>
-<script type="module" src="/static/studio.js"></script>
+<script type="module" src="/static/{script}"></script>
 </body>
 </html>
 """
@@ -64,13 +75,15 @@ class Studio:
     def __init__(self, root: Path, opened: str, token: str, host: str, most: int = MOST_WINDOWS) -> None:
         self._folder = Folder(root)
         self._opened, self._token, self._host, self._most = opened, token, host, most
-        self._windows, self._editors = Windows(), 0
+        self._windows, self._editors, self._invitations = Windows(), 0, Invitations(token)
         self.app = Starlette(
             routes=[
                 Route("/", self._page),
                 Route("/static/{name}", self._static),
                 WebSocketRoute("/session", self._session),
                 WebSocketRoute("/language", self._language),
+                Route("/guest", self._guest_page),
+                WebSocketRoute("/seat", self._seat),
             ],
             lifespan=self._lifespan,
         )
@@ -97,14 +110,20 @@ class Studio:
         ):
             words = "This address lacks the token that `socialai studio` has printed; open the whole address."
             return PlainTextResponse(words, 403)
+        title, root = f"studio: {self._folder.root.name}", str(self._folder.root)
+        return self._filled("studio.js", title, root, self._opened)
+
+    async def _guest_page(self, request: Request) -> Response:
+        """The page of a person who was invited to a seat; whether the link is good its connection is told."""
+        if not self._is_own_host(request.headers.get("host")):
+            return PlainTextResponse("This is not the address of the studio.", 403)
+        return self._filled("guest.js", "a game for several")
+
+    def _filled(self, script: str, title: str, root: str = "", opened: str = "") -> Response:
+        """The page with one of our scripts."""
         nonce = secrets.token_urlsafe(16)
-        page = _PAGE.format(
-            nonce=nonce,
-            title=escape(f"studio: {self._folder.root.name}"),
-            root=escape(str(self._folder.root)),
-            opened=escape(self._opened),
-        )
-        return self._guarded(HTMLResponse(page), nonce)
+        words = {"title": escape(title), "root": escape(root), "opened": escape(opened)}
+        return self._guarded(HTMLResponse(_PAGE.format(nonce=nonce, script=script, **words)), nonce)
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -135,7 +154,7 @@ class Studio:
 
     async def _session(self, socket: WebSocket) -> None:
         if await self._welcome(socket) and await self._has_room(socket, len(self._windows.names)):
-            await Window(socket, self._folder, self._windows).serve()
+            await Window(socket, self._folder, self._windows, self._invitations).serve()
 
     async def _language(self, socket: WebSocket) -> None:
         if not await self._welcome(socket) or not await self._has_room(socket, self._editors):
@@ -152,21 +171,39 @@ class Studio:
         finally:
             self._editors -= 1
 
+    async def _seat(self, socket: WebSocket) -> None:
+        """Let a person who has the link to it have a seat of a window's game."""
+        if not await self._comes_from_us(socket):
+            return
+        found = self._invitations.find(socket.query_params.get("code"))
+        if found is None:
+            words = "this game is not open now; the page goes on when it is, or ask for another link"
+            await close(socket, NO_GAME, words)
+            return
+        game, seat = found
+        await game.seat(socket, seat)
+
     async def _welcome(self, socket: WebSocket) -> bool:
         """Accept a window that knows the token and comes from our own page.
 
         A page from elsewhere hears nothing; ours, which tries again after the server was started anew, hears why not.
         """
-        host, origin = socket.headers.get("host"), socket.headers.get("origin")
-        if not self._is_own_host(host) or origin != f"http://{host}":
-            await close(socket, 1008)
+        if not await self._comes_from_us(socket):
             return False
-        await socket.accept()
         if not self._is_known(socket.query_params.get("token")):
             await close(
                 socket, WRONG_TOKEN, "another studio answers here now; open the address that it has printed"
             )
             return False
+        return True
+
+    async def _comes_from_us(self, socket: WebSocket) -> bool:
+        """Accept a connection from our own page."""
+        host, origin = socket.headers.get("host"), socket.headers.get("origin")
+        if not self._is_own_host(host) or origin != f"http://{host}":
+            await close(socket, 1008)
+            return False
+        await socket.accept()
         return True
 
     async def _has_room(self, socket: WebSocket, opened: int) -> bool:

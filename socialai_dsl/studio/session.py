@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -42,12 +42,20 @@ from socialai_dsl.studio.messages import RefusalError, Room, Shown
 from socialai_dsl.traces import Thought, Tracer
 from socialai_dsl.traces.endings import endings_of
 from socialai_dsl.traces.page import replay_page
+from socialai_dsl.traces.state import names_of
+from socialai_dsl.traces.tracing import sight_of
 from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
 Reply = dict[str, Any]
+Acts = Mapping[Seat, Sequence[int]]
+"""Actions of people on other seats than the own one, (heads,) each."""
 
 _FIRST: Final = Room()
 _NOBODY_ELSE: Final[Mapping[Seat, str]] = MappingProxyType({})
+_NO_ACTS: Final[Acts] = MappingProxyType({})
+_PERSON: Final = "a person"
+_MOST_PHRASES: Final = 2000
+_ENDED_FOR_GUESTS: Final = "the episode has ended; another one begins when whoever invited you begins it"
 _ENDED: Final = "the episode has ended; take steps back, or begin another"
 _FLOOR: Final = prelude().types["floor"].code
 
@@ -77,6 +85,7 @@ class Session:
         self._file = self._scenario = Path()
         self._texts: dict[Path, Source] = {}
         self._game: tuple[Stage, Tracing] | None = None
+        self._words: Mapping[Seat, str] = {}
         self._phrases = Phrases((), Sentences((), (), ()))
         self._text_view: TextView | None = None
         self._briefing = NO_BRIEFING
@@ -85,6 +94,8 @@ class Session:
         self._gaze: tuple[int, int, Gaze] | None = None
         self._policy: Policy = RandomPolicy(())
         self._others: Mapping[Seat, str] = {}
+        self._filled: Mapping[Seat, Any] | None = None
+        self._before: Mapping[Seat, NDArray[np.uint8]] = {}
         self._prepared = False
 
     def draw(self, path: str, text: str, room: Room = _FIRST) -> Reply:
@@ -143,12 +154,13 @@ class Session:
         if casting != self._casting:
             self._use(load(f"{self._scenario}{casting.variant}", self._texts), casting)
         stage, tracing = self._playing()
-        tracing.title = _title(room)
+        self._let_sit(_NO_ACTS)
+        tracing.title, tracing.tracer.players = _title(room), dict(self._words)
         try:
             stage.begin(reset_arguments(**room.model_dump()))
         except (ValueError, RoomError) as error:
             raise RefusalError(str(error)) from None
-        self._room = room
+        self._room, self._before = room, {}
         self._begin_anew()
         return self._episode([self._seat()])
 
@@ -174,7 +186,7 @@ class Session:
             "episode": {
                 "trace": tracing.tracer.trace().model_dump(mode="json", exclude_defaults=True)
                 | {"format": "socialai-trace/1"},
-                "phrases": self._phrases.sentences()[:2000],
+                "phrases": self._phrases.sentences()[:_MOST_PHRASES],
                 "rules": list(stage.env.counters()["rules"]),
                 "player": self._casting.player,
                 "variant": self._casting.variant,
@@ -184,16 +196,60 @@ class Session:
             }
         }
 
-    def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
-        """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
+    def act(
+        self,
+        movement: str | None = None,
+        sentence: str | None = None,
+        line: str | None = None,
+        acts: Acts = _NO_ACTS,
+        stands_in: bool = False,
+    ) -> Reply:
+        """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it.
+
+        Args:
+            movement: a word of the scenario's actions.
+            sentence: what is said.
+            line: both as typed, in place of the two.
+            acts: what people on other seats do.
+            stands_in: whether the script of the own seat plays instead, if there is one.
+        """
         stage, _ = self._playing()
-        if line is not None:
-            movement, sentence = self._phrases.act(line.strip())
-        try:
-            action = stage.env.encode_action((movement, sentence))
-        except ValueError:
-            raise RefusalError(self._phrases.problem(line if line is not None else sentence or "")) from None
-        return self._step(action[None], None)
+        if stands_in and stage.running.all() and has_script(stage.env.program, stage.own):
+            return self._step(stage.env.scripted_action()[None], None, acts)
+        return self._step(self._encoded(movement, sentence, line)[None], None, acts)
+
+    def choose(
+        self, movement: str | None = None, sentence: str | None = None, line: str | None = None
+    ) -> Reply:
+        """The action that words mean, which see `act`; nothing is played."""
+        stage, _ = self._playing()
+        if not stage.running.all():
+            raise RefusalError(_ENDED_FOR_GUESTS)
+        return {"action": self._encoded(movement, sentence, line).tolist()}
+
+    def glance(self, seat: Seat) -> Reply:
+        """What a person on another seat gets now, and can say."""
+        stage, _ = self._playing()
+        env, program = stage.env, stage.env.program
+        if seat == stage.own or seat not in env.seats:
+            raise RefusalError(f"nobody else can have the seat of {seat} in what is played now")
+        moment, before = env.seat_moment(seat), self._before.get(seat)
+        movement = None if moment.action is None else (*program.actions, None)[moment.action[0]]
+        last = None if before is None else LastStep(movement, before, moment.success)
+        view = env.view(moment.observation["image"], seat)
+        described = env.describe()
+        return {
+            **self._read(moment.observation, moment.info, last),
+            "seat": seat,
+            "t": stage.steps,
+            "name": names_of(env.scenario, described)[seat],
+            "facing": view.facing,
+            "view": sight_of(view),
+            "heard": [line for line in moment.info["history"].split("\n") if line],
+            "success": moment.success,
+            "actions": list(program.actions),
+            "phrases": self._phrases.sentences()[:_MOST_PHRASES],
+        }
 
     def prepare(self) -> None:
         """Take a step and take it back, if none was taken yet: the first one prepares all explanations.
@@ -206,14 +262,14 @@ class Session:
             self._prepared = True
             stage.rehearse({stage.own: stage.env.encode_action((None, None))[None]}, stage.env.explain)
 
-    def auto(self) -> Reply:
-        """Let the chosen player play a step."""
+    def auto(self, acts: Acts = _NO_ACTS) -> Reply:
+        """Let the chosen player play a step; `acts` is what people on other seats do."""
         stage, _ = self._playing()
         if not stage.running.all():
             raise RefusalError(_ENDED)
         action = self._policy.act(stage.observations[stage.own])
         assert not isinstance(action, Awaitable), "internal: nobody answers later here"
-        return self._step(action, thought_of(self._policy))
+        return self._step(action, thought_of(self._policy), acts)
 
     def back(self, to: int) -> Reply:
         """Take steps back until `to` of them are left, chance included."""
@@ -222,6 +278,7 @@ class Session:
             raise RefusalError(f"there are {stage.steps} steps to take back")
         while stage.steps > to:
             stage.back()
+        self._before = {}
         self._begin_anew()
         for moment in stage.moments[:-1]:  # it remembers what it has seen, and what it has drawn
             self._policy.act(moment.observations[stage.own])
@@ -364,7 +421,8 @@ class Session:
         if casting.player != "me":
             policy = _policy("oracle" if casting.player == SCRIPT else casting.player, env)
         self._loaded, self._gaze, self._game, self._casting = loaded, None, (stage, tracing), casting
-        self._others, self._policy, self._prepared = others, policy, False
+        self._words = words
+        self._others, self._filled, self._policy, self._prepared = others, company, policy, False
         self._phrases = Phrases(program.actions, program.sentences)
         self._text_view, self._briefing = TextView(program, "grid", seat=stage.own), brief(loaded)
 
@@ -412,10 +470,35 @@ class Session:
             raise RefusalError("there is no room yet; the scenario has mistakes")
         return self._game
 
-    def _step(self, action: NDArray[np.int64], thought: Thought | None) -> Reply:
+    def _encoded(self, movement: str | None, sentence: str | None, line: str | None) -> NDArray[np.int64]:
+        """The action that words mean, int64 (heads,). Raises RefusalError, which says what was probably meant."""
+        stage, _ = self._playing()
+        if line is not None:
+            movement, sentence = self._phrases.act(line.strip())
+        try:
+            action: NDArray[np.int64] = stage.env.encode_action((movement, sentence))
+        except ValueError:
+            said = line if line is not None else sentence or movement or ""
+            raise RefusalError(self._phrases.problem(said)) from None
+        return action
+
+    def _let_sit(self, acts: Acts) -> None:
+        """Let those on other seats do this in the next step, and where nothing is said whoever stands in do it."""
+        stage, tracing = self._playing()
+        for seat, stand_in in (self._filled or {}).items():
+            if seat in acts:
+                stage.env.fill_seat(seat, ReplayedPolicy([np.array(acts[seat], np.int64)]))
+                tracing.tracer.players[seat] = _PERSON
+            elif tracing.tracer.players[seat] == _PERSON:
+                stage.env.fill_seat(seat, stand_in)
+
+    def _step(self, action: NDArray[np.int64], thought: Thought | None, acts: Acts) -> Reply:
         stage, tracing = self._playing()
         if not stage.running.all():
             raise RefusalError(_ENDED)
+        seats = [seat for seat in stage.env.seats if seat != stage.own]
+        images = {seat: stage.env.seat_moment(seat).observation["image"] for seat in seats}
+        self._let_sit(acts)
         before, tracing.thought = tracing.tracer.counts(), thought
         image = stage.observations[stage.own]["image"][0].copy()
         try:
@@ -424,6 +507,7 @@ class Session:
             player = self._casting.player
             who = "" if player == "me" else f"{player} chose what cannot be done: "
             raise RefusalError(f"{who}{error}") from None
+        self._before = images
         more = tracing.tracer.trace(before).model_dump(mode="json", exclude_defaults=True)
         movement = (*stage.env.program.actions, None)[action[0, 0]]
         success = bool(step.success[0]) if step.ended[0] else None
@@ -432,12 +516,19 @@ class Session:
     def _seat(self, last: LastStep | None = None) -> Reply:
         """What whoever plays is told, sees and hears, as a language model reads it."""
         stage, _ = self._playing()
-        assert self._text_view is not None, "internal: what is played has a view"
         observation = {name: value[0] for name, value in stage.observations[stage.own].items()}
+        return self._read(observation, stage.info, last)
+
+    def _read(
+        self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], last: LastStep | None
+    ) -> Reply:
+        stage, _ = self._playing()
+        assert self._text_view is not None, "internal: what is played has a view"
+        member = {"member": stage.info.get("member")}
         return {
-            "told": self._text_view.task(self._briefing.text(stage.info.get("member"))),
-            "seen": self._text_view.observe(observation, stage.info, last),
-            "compass": self._text_view.by_compass(stage.info),
+            "told": self._text_view.task(self._briefing.text(member["member"])),
+            "seen": self._text_view.observe(observation, info, last),
+            "compass": self._text_view.by_compass(member),
         }
 
 
@@ -446,6 +537,8 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "begin": Session.begin,
     "show": Session.show,
     "act": Session.act,
+    "choose": Session.choose,
+    "glance": Session.glance,
     "auto": Session.auto,
     "back": Session.back,
     "place": Session.place,

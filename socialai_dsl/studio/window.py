@@ -5,18 +5,19 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import suppress
+from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from socialai_dsl.studio import messages
+from socialai_dsl.studio.connection import contents, send, send_soon
 from socialai_dsl.studio.drafts import new_window
 from socialai_dsl.studio.engine import Engine, EngineLostError
 from socialai_dsl.studio.files import ConflictError, FileError, Folder
 from socialai_dsl.studio.filing import Filing
 from socialai_dsl.studio.messages import WINDOW_QUESTIONS, Refused, parsed
+from socialai_dsl.studio.sharing import Invitations, SharedGame
 
 _CLAIM_SECONDS: Final = 1.0
 _MOST_WAITING: Final = 200
@@ -69,20 +70,22 @@ class Window:
         socket: the connection, accepted.
         folder: its files.
         windows: all windows.
+        invitations: to seats of their games.
     """
 
-    def __init__(self, socket: WebSocket, folder: Folder, windows: Windows) -> None:
-        self._socket, self._folder, self._windows = socket, folder, windows
+    def __init__(self, socket: WebSocket, folder: Folder, windows: Windows, invitations: Invitations) -> None:
+        self._socket, self._folder, self._windows, self._invitations = socket, folder, windows, invitations
         self._name = windows.enter()
         self._game, self._checks = Engine(folder.root), Engine(folder.root)
         # Files, the game and checks do not wait for each other; within each, answers come in the order of questions.
         self._files, self._plays, self._claims = (_Lane(_MOST_WAITING) for _ in range(3))
+        self._shared = SharedGame(self._game, self._put, lambda said: send_soon(socket, said))
 
     async def serve(self) -> None:
         """Answer until the window is closed; then nothing of it is left but its drafts."""
         filing = asyncio.create_task(self._work(self._files, self._ask_files))
         others = [
-            asyncio.create_task(self._work(self._plays, self._game.ask)),
+            asyncio.create_task(self._work(self._plays, self._game.ask, self._shared.changed)),
             asyncio.create_task(self._work(self._claims, self._checks.ask)),
         ]
         try:
@@ -93,6 +96,8 @@ class Window:
             for task in others:
                 task.cancel()
             await asyncio.gather(*others, return_exceptions=True)
+            self._invitations.withdraw(self._shared)
+            await self._shared.end()
             await self._game.stop()
             await self._checks.stop()
             await self._files.put(None)
@@ -102,12 +107,17 @@ class Window:
     async def _take(self, content: str | bytes) -> None:
         """Put a message into its lane, or say at once why it has none."""
         if isinstance(content, bytes):
-            await self._send(_refusal(None, "got a binary message, expected JSON as text"))
+            await send(self._socket, _refusal(None, "got a binary message, expected JSON as text"))
             return
         asked = parsed(WINDOW_QUESTIONS, content)
         if isinstance(asked, Refused):
-            await self._send(asked.model_dump_json())
+            await send(self._socket, asked.model_dump_json())
             return
+        if isinstance(asked, messages.FileQuestion) or not self._shared.holds_back(asked):
+            self._put(asked)
+
+    def _put(self, asked: Any) -> None:
+        """Put a question into its lane."""
         if isinstance(asked, messages.FileQuestion):
             lane = self._files
         else:
@@ -115,10 +125,16 @@ class Window:
         try:
             lane.put_nowait(asked)
         except asyncio.QueueFull:
-            await self._send(_refusal(asked.id, f"{_MOST_WAITING} questions wait already for their answers"))
+            why = f"{_MOST_WAITING} questions wait already for their answers"
+            send_soon(self._socket, _refusal(asked.id, why))
 
-    async def _work(self, lane: _Lane, ask: Callable[[Any], Awaitable[str]]) -> None:
-        """Answer the questions of a lane until None comes; no question ends it."""
+    async def _work(
+        self,
+        lane: _Lane,
+        ask: Callable[[Any], Awaitable[str]],
+        after: Callable[[Any], Awaitable[None]] | None = None,
+    ) -> None:
+        """Answer the questions of a lane until None comes; no question ends it. What comes `after` each is told it."""
         while (asked := await lane.get()) is not None:
             try:
                 answer = await ask(asked)
@@ -132,34 +148,22 @@ class Window:
                 _log.exception("the studio has failed")
                 said = f"the studio has failed; please report it: {type(error).__name__}: {error}"
                 answer = _refusal(asked.id, said)
-            await self._send(answer)
+            await send(self._socket, answer)
+            if after is not None:
+                await after(asked)
 
     async def _ask_files(self, asked: Any) -> str:
         if isinstance(asked, messages.Hello):
             if asked.window is not None:
                 self._name = await self._windows.rename(self._name, asked.window)
             reply = {"window": self._name}
+        elif isinstance(asked, messages.Invite):
+            self._shared.seconds = asked.seconds
+            reply = {"code": self._invitations.invite(self._shared, self._name, asked.seat)}
         else:
             filing = Filing(self._folder, self._name, self._windows.names)
             reply = await asyncio.to_thread(filing.answer, asked)
         return json.dumps({"id": asked.id, "do": asked.do, **reply})
-
-    async def _send(self, text: str) -> None:
-        with suppress(RuntimeError, WebSocketDisconnect):  # it was closed, which its reader is told as well
-            await self._socket.send_text(text)
-
-
-async def contents(socket: WebSocket) -> AsyncIterator[str | bytes]:
-    """What comes over a connection until it is closed."""
-    while (message := await socket.receive())["type"] == "websocket.receive":
-        text = message.get("text")
-        yield text if text is not None else message.get("bytes") or b""
-
-
-async def close(socket: WebSocket, code: int, why: str | None = None) -> None:
-    """Close a connection, if the other side has not."""
-    with suppress(RuntimeError, WebSocketDisconnect):
-        await socket.close(code, why)
 
 
 def _refusal(number: int | None, why: str, *, conflict: bool = False, lost: bool = False) -> str:

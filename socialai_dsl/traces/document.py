@@ -40,6 +40,20 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class Sight(_Part):
+    """What somebody sees in 7 by 7 cells, row by row, and looks up.
+
+    Attributes:
+        cells: the look of each. gestures, held, marks: as `Moment` has them of the view, with looks in place of their
+            numbers.
+    """
+
+    cells: list[Look]
+    gestures: list[Gesture]
+    held: list[tuple[_Number, Look]]
+    marks: list[tuple[_Number, list[Mark]]]
+
+
 class Line(_Part):
     """Something that the agent heard.
 

@@ -282,6 +282,16 @@ class Tracer:
         return Outcome(name=name, success=bool(info["success"]), text=self._endings.get(name, name))
 
 
+def sight_of(view: View) -> dict[str, Any]:
+    """What somebody sees, without numbered looks, as `document.Sight` has it."""
+    return {
+        "cells": view.codes.reshape(-1, 4).tolist(),
+        "gestures": _gestures(view.gestures, VIEW),
+        "held": [(y * VIEW + x, code) for (x, y), code in view.held.items()],
+        "marks": [(y * VIEW + x, list(marks)) for (x, y), marks in view.marks.items()],
+    }
+
+
 Counts = tuple[int, int, int, int, int]
 
 

@@ -840,3 +840,53 @@ def test_the_other_seat_is_left_empty_and_a_script_is_watched_on_it(levers: Page
 def test_where_one_plays_alone_there_are_no_seats_to_choose(studio: Page) -> None:
     assert not studio.get_by_label("whose seat").is_visible()
     assert not studio.locator(".seats").is_visible()
+
+
+def test_two_people_play_in_browsers_of_their_own(levers: Page, browser: Browser) -> None:
+    begin(levers, SEED)
+    levers.get_by_role("button", name="Invite…").click()
+    link = levers.get_by_label("link to the seat of partner").input_value()
+    levers.get_by_role("button", name="Close").click()
+    context = browser.new_context(viewport={"width": 900, "height": 900})
+    other = context.new_page()
+    failures: list[str] = []
+    other.on("pageerror", lambda error: failures.append(str(error)))
+    other.goto(link)
+    other.get_by_role("heading", name="You are Bob").wait_for()
+    levers.get_by_text("Bob is here").wait_for()
+    assert "token" not in other.content()
+
+    levers.keyboard.press("ArrowLeft")
+    levers.get_by_text("waiting for the others").wait_for()
+    other.get_by_text("the others wait for you").wait_for()
+    assert step(levers) == 0
+    other.keyboard.press("/")
+    other.keyboard.type("right ready")
+    other.keyboard.press("Enter")
+    reach(levers, 1)
+    rows = levers.locator(".seats tbody tr").all_inner_texts()
+    assert ["left" in rows[0], "a person" in rows[1], "right" in rows[1], "ready" in rows[1]] == [True] * 4
+    other.get_by_role("heading", name="Step 1").wait_for()
+
+    other.keyboard.press("Escape")
+    other.keyboard.press("ArrowUp")
+    other.get_by_text("you have chosen; waiting for the others").wait_for()
+    levers.get_by_text("Bob is here and has chosen").wait_for()
+    levers.get_by_label("what to do or say").fill("forward now")
+    levers.get_by_label("what to do or say").press("Enter")
+    reach(levers, 2)
+    other.locator(".transcript li", has_text="Ann: now").wait_for()
+
+    levers.reload()
+    drawn(levers)
+    other.get_by_text("nobody else can have the seat of partner").wait_for()
+    with another_room(levers):
+        levers.get_by_label("scenario", exact=True).and_(levers.locator("select")).select_option(
+            "levers_together.yaml"
+        )
+    other.get_by_role("heading", name="Step 0").wait_for()
+    context.close()
+    assert failures == []
+    levers.keyboard.press("Escape")
+    levers.keyboard.press("ArrowUp")
+    reach(levers, 1)

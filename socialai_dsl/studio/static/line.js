@@ -31,7 +31,7 @@ const own = {
 /** Questions to the server; those about files and those about the game are answered in order. */
 export class Line {
   /** @param {(open: boolean, why: string) => void} changed told when the connection opens or is lost, and why
-   * @param {(said: string) => void} told what the server says without being asked */
+   * @param {(said: Reply) => void} told what the server says without being asked */
   constructor(changed, told) {
     this.changed = changed;
     this.told = told;
@@ -47,7 +47,7 @@ export class Line {
       const reply = JSON.parse(event.data), answer = this.waiting.get(reply.id);
       this.waiting.delete(reply.id);
       if (answer) answer(reply);
-      else if (reply.refused) this.told(reply.refused);
+      else this.told(reply);
     };
     this.socket.onclose = (event) => {
       for (const answer of this.waiting.values()) answer({ refused: "the connection was lost", lost: true });
@@ -75,6 +75,12 @@ export class Line {
   }
 }
 
+/** What is kept under a name, in a list. @param {Storage} storage @param {string} name @returns {string[]} */
+function listed(storage, name) {
+  const found = JSON.parse(storage.getItem(name) ?? "[]");
+  return Array.isArray(found) ? found.map(String) : [];
+}
+
 /** How somebody has arranged the page, which all windows of this address begin with. */
 export const settings = {
   /** @param {string} name @param {string} otherwise */
@@ -89,6 +95,20 @@ export const settings = {
   set(name, value) {
     try {
       localStorage.setItem(name, value);
+    } catch {}
+  },
+  /** A list that is this window's alone. @param {string} name */
+  ofWindow(name) {
+    try {
+      return listed(sessionStorage, name);
+    } catch {
+      return [];
+    }
+  },
+  /** @param {string} name @param {string[]} list */
+  setOfWindow(name, list) {
+    try {
+      sessionStorage.setItem(name, JSON.stringify(list));
     } catch {}
   },
 };

@@ -8,6 +8,9 @@ import { NPC } from "./tiles.js";
 
 const MARBLE = 16, UP = 3, VIEW = 7;
 const AGENT = "the agent";
+/** What keys do. @type {Record<string, string>} */
+export const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
+  t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
 
 /** All rules with how often they have fired, in this episode and in all since the text was changed. */
 export class Counts {
@@ -62,7 +65,7 @@ export class Counts {
 /** The view with directions as the observation has them: where they are those of a compass, the agent's own is not given.
  * @param {import("./trace.js").Picture} view @param {number} facing where the agent looks @param {boolean} compass
  * @returns {import("./trace.js").Picture} */
-function observed(view, facing, compass) {
+export function observed(view, facing, compass) {
   const turned = (/** @type {number} */ drawn) => (drawn + facing + 1) % 4;
   const turns = (/** @type {number} */ type) => type === MARBLE || (type === NPC && compass);
   const cells = view.cells.map(([type, colour, status, drawn]) =>

@@ -5,16 +5,13 @@ import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Seats, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { claimItems, findingItems, marked, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
-import { Counts, Seat, Views } from "./parts.js";
+import { Counts, MOVES, Seat, Views } from "./parts.js";
 import { Episode, slotsOf } from "./trace.js";
 import { Writing } from "./writing.js";
 
 /** @typedef {import("./line.js").Reply} Reply */
 
 const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
-/** @type {Record<string, string>} */
-const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
-  t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
 
 class Studio {
   constructor() {
@@ -27,6 +24,8 @@ class Studio {
     /** What is played: the room, and variants and parameters behind the scenario's name.
      * @type {{room: Record<string, any>, variant: string}} */
     this.place = { room: { seed: 0 }, variant: "" };
+    /** @type {string[]} seats to which there are links, also after this window was loaded again */ this.invited = settings.ofWindow("invited");
+    /** @type {number | null} how long those wait who have chosen */ this.seconds = 60;
     /** @type {Record<string, string>} who has the other seats in the episode that is shown */ this.casting = {};
     this.length = 0;
     /** @type {Episode | null} */ this.episode = null;
@@ -63,7 +62,9 @@ class Studio {
     this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin() });
     this.own = make("select", { "aria-label": "whose seat", onchange: () => this.begin() });
     this.companions = make("span", { class: "others", role: "group", "aria-label": "who has the other seats" });
-    this.company = make("div", { class: "controls company", hidden: true }, make("label", {}, "on the seat of ", this.own), this.companions);
+    this.here = make("span", { class: "quiet", "aria-live": "polite" });
+    /** @type {Reply} who is here, and who has chosen */ this.guests = { chosen: {}, own: false };
+    this.company = make("div", { class: "controls company", hidden: true }, make("label", {}, "on the seat of ", this.own), this.companions, this.here);
     /** @type {{names: string[], rivals: string[], seats: {seat: string, script: boolean}[]}} who can play, besides me and chance */
     this.plays = { names: [], rivals: [], seats: [{ seat: "agent", script: false }] };
     this.seated = make("input", { type: "checkbox", onchange: () => this.sit() });
@@ -91,7 +92,7 @@ class Studio {
     document.body.replaceChildren(this.root);
     const nonce = document.querySelector("meta[name=style-nonce]")?.getAttribute("content") ?? "";
     this.editor = new Editor(this.writing.pane, { root, language: address("language"), nonce, wraps: this.wraps.checked, changed: () => this.typedText(), save: () => this.save() });
-    this.line = new Line((open, why) => this.connected(open, why), (said) => this.tell(said));
+    this.line = new Line((open, why) => this.connected(open, why), (said) => this.hear(said));
     addEventListener("keydown", (event) => this.key(event));
     addEventListener("resize", () => this.show());
     addEventListener("pagehide", () => this.keep());
@@ -136,6 +137,7 @@ class Studio {
     this.tell(why);
     if (!open) return;
     await this.list();
+    for (const seat of this.invited) await this.line.ask("invite", { seat, seconds: this.seconds });
     if (this.name) {
       await this.keep();
       this.draw();
@@ -178,8 +180,40 @@ class Studio {
     const called = (/** @type {string} */ seat) => (episode && episode.called(seat) !== seat ? `${seat} “${episode.called(seat)}”` : seat);
     this.own.replaceChildren(...seats.map(({ seat }) => make("option", { value: seat, selected: seat === own }, called(seat))));
     this.companions.replaceChildren(...seats.filter(({ seat }) => seat !== own).map(({ seat, script }) =>
-      make("label", {}, `${called(seat)}: `, make("select", { "aria-label": `who plays ${seat}`, "data-seat": seat, onchange: () => this.begin() },
-        ...this.options(others[seat], [...(script ? [["script", "script"]] : []), ["random", "random"], ["nobody", "nobody"]])))));
+      make("span", {}, make("label", {}, `${called(seat)}: `, make("select", { "aria-label": `who plays ${seat}`, "data-seat": seat, onchange: () => this.begin() },
+        ...this.options(others[seat], [...(script ? [["script", "script"]] : []), ["random", "random"], ["nobody", "nobody"]]))),
+        make("button", { onclick: () => this.invite(seat), title: `a link, with which somebody plays ${seat} in a browser of their own` }, "Invite…"))));
+    this.offerGuests();
+  }
+
+  /** Who is here, and who has chosen. */
+  offerGuests() {
+    const { chosen, own } = this.guests, here = Object.entries(chosen);
+    this.here.textContent = here.map(([seat, has]) => `${this.episode?.called(seat) ?? seat} is here${own || has ? (has ? " and has chosen" : " and is choosing") : ""}`).join("; ");
+  }
+
+  /** A link to a seat. @param {string} seat */
+  async invite(seat) {
+    const made = await this.line.ask("invite", { seat, seconds: this.seconds });
+    if (made.refused) return this.tell(made.refused);
+    if (!this.invited.includes(seat)) settings.setOfWindow("invited", this.invited = [...this.invited, seat]);
+    const link = make("input", { readonly: true, value: `${location.origin}/guest?code=${made.code}`, "aria-label": `link to the seat of ${seat}`, onfocus: () => link.select() });
+    const waits = make("select", { "aria-label": "how long to wait", onchange: () => {
+      this.seconds = Number(waits.value) || null;
+      this.line.ask("invite", { seat, seconds: this.seconds });
+    } }, ...[["10", "10 seconds"], ["60", "a minute"], ["300", "five minutes"], ["", "for ever"]].map(([value, word]) => make("option", { value, selected: value === String(this.seconds ?? "") }, word)));
+    this.ask(`Whoever opens this link plays ${seat} in this window's game, and sees and hears what ${seat} does. A step is taken when all have chosen. Whoever chooses too late or leaves is stood in for by “${this.casting[seat] ?? "script"}”.${["127.0.0.1", "localhost", "[::1]"].includes(location.hostname) ? " The link is good on this machine; for others start the studio with --host." : ""}`,
+      [["Close", () => {}]], make("label", {}, "Link ", link), make("label", {}, "Wait for those who have not chosen ", waits));
+    link.select();
+  }
+
+  /** What the server says without being asked. @param {Reply} said */
+  hear(said) {
+    if (said.refused) this.tell(said.refused);
+    else if (said.do === "guests") {
+      this.guests = said;
+      this.offerGuests();
+    } else if (said.do === "act") this.went(said);
   }
 
   /** Who plays where, and what is played: a rival is a variant of the scenario, with a script. */
@@ -492,6 +526,7 @@ class Studio {
 
   /** @param {Reply} what */
   async act(what, name = "act") {
+    if (Object.keys(this.guests.chosen).length) this.tell("waiting for the others …");
     const done = await this.line.ask(name, what);
     if (done.refused) {
       this.tell(done.refused);
@@ -499,12 +534,17 @@ class Studio {
       if (done.lost) this.draw();
       return false;
     }
+    this.went(done);
+    return true;
+  }
+
+  /** A step was taken. @param {Reply} done */
+  went(done) {
     this.tell("");
     this.episode?.add(done.more);
     this.seat.moments.push(done.seat);
     this.length = this.episode?.length ?? 0;
     this.show();
-    return true;
   }
 
   /** @param {number} step */

@@ -173,6 +173,7 @@ export class Episode {
     this.marks.push(...(more.marks ?? []));
     this.texts.push(...(more.texts ?? []));
     this.rules.push(...(more.rules ?? []));
+    if (more.players) this.trace.players = more.players;
     for (const moment of more.moments ?? []) this.scenes.push(this.scene(moment));
   }
 

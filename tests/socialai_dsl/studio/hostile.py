@@ -19,6 +19,9 @@ GAME: list[dict[str, Any]] = [
     {"do": "act", "movement": "left", "sentence": None, "line": None},
     {"do": "act", "line": "forward How are you"},
     {"do": "auto"},
+    {"do": "act", "movement": "left", "acts": {"bob": [0, 0, 0, 0]}, "stands_in": True},
+    {"do": "choose", "line": "forward How are you"},
+    {"do": "glance", "seat": "bob"},
     {"do": "back", "to": 0},
     {"do": "place", "who": "wizard", "at": [1, 1]},
     {"do": "look", "who": "wizard"},
@@ -32,6 +35,7 @@ GAME: list[dict[str, Any]] = [
 FILES: list[dict[str, Any]] = [
     {"do": "hello", "window": None},
     {"do": "list"},
+    {"do": "invite", "seat": "bob", "seconds": 60.0},
     {"do": "read", "name": "talkitout.yaml", "adopt": False},
     {"do": "save", "name": "other.yaml", "text": "x", "digest": None, "over": True},
     {"do": "draft", "name": "talkitout.yaml", "text": "typed", "base": None},

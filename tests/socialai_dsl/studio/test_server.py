@@ -10,13 +10,10 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 import webbrowser
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, suppress
-from dataclasses import dataclass
-from http.client import HTTPConnection, HTTPResponse
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -36,7 +33,8 @@ websocket = pytest.importorskip(
 
 from websockets.exceptions import WebSocketException  # noqa: E402
 
-from socialai_dsl.studio import engine, server  # noqa: E402
+from socialai_dsl.studio import engine  # noqa: E402
+from tests.socialai_dsl.studio.clients import Client, Window, serving  # noqa: E402
 from tests.socialai_dsl.studio.hostile import FILES, GAME, texts  # noqa: E402
 from tests.socialai_dsl.studio.processes import wait_until_none_works, workers  # noqa: E402
 
@@ -44,54 +42,11 @@ SCENARIOS = Path(__file__).parents[3] / "scenarios"
 MOST = 3
 
 
-@dataclass
-class Client:
-    """Asks a server that runs in a thread of this process."""
-
-    port: int
-
-    def get(self, path: str, host: str | None = None) -> HTTPResponse:
-        with closing(HTTPConnection("127.0.0.1", self.port, timeout=30)) as connection:
-            connection.request("GET", path, headers={"Host": host or f"127.0.0.1:{self.port}"})
-            answer = connection.getresponse()
-            answer.read()
-            return answer
-
-    def window(self, path: str = "session?token=token", origin: str | None = "own") -> Any:
-        own = f"http://127.0.0.1:{self.port}"
-        return websocket.connect(
-            f"ws://127.0.0.1:{self.port}/{path}", origin=own if origin == "own" else origin, max_size=None
-        )
-
-
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[Client]:
     shutil.copy(SCENARIOS / "talkitout.yaml", tmp_path)
-    studio = server.Studio(tmp_path, "talkitout.yaml", "token", "127.0.0.1", MOST)
-    listening = socket.create_server(("127.0.0.1", 0))
-    running = uvicorn.Server(uvicorn.Config(studio.app, log_level="error", ws="websockets-sansio"))
-    thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
-    thread.start()
-    while not running.started:
-        time.sleep(0.02)
-    yield Client(listening.getsockname()[1])
-    wait_until_none_works()
-    running.should_exit = True
-    thread.join(30)
-    assert not thread.is_alive()
-
-
-class Window:
-    def __init__(self, opened: Any) -> None:
-        self.opened, self.number = opened, 0
-
-    def ask(self, do: str, /, **more: Any) -> dict[str, Any]:
-        self.number += 1
-        self.opened.send(json.dumps({"id": self.number, "do": do, **more}))
-        answer: dict[str, Any] = json.loads(self.opened.recv(60))
-        assert answer.pop("id") == self.number
-        assert answer.pop("do") in (do, "refused")
-        return answer
+    with serving(tmp_path, "talkitout.yaml", MOST) as found:
+        yield found
 
 
 def test_the_page_needs_the_token_and_allows_no_script_but_ours(client: Client) -> None:
