@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from socialai_dsl.compilation import compile_scenario
+from socialai_dsl.envs.factory import make, make_vec
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.loader.shipped import shipped_scenarios
 from tests.agreement import Pair, seats_agree
 from tests.quick import one_in
 from tests.scenario_fuzzer import write, write_seated
@@ -58,6 +60,44 @@ def test_random_scenarios_agree_on_all_seats(tmp_path: Path, first: int) -> None
 def test_five_thousand_random_scenarios_agree_on_all_seats(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 250):
         compare(tmp_path, seed, steps=60)
+
+
+OPENED = [
+    *shipped_scenarios(),
+    "school/lever_door",
+    "school/boxes",
+    "school/color_match",
+    "classics/ice_cream_van",
+]
+
+
+@pytest.mark.parametrize("name", OPENED)
+def test_opening_the_seats_of_a_scenario_changes_nothing_for_its_agent(name: str) -> None:
+    """While nobody sits there, whoever has a frame follows it as ever: the same pictures, words and rewards."""
+    plain, opened = (make_vec(one, 4, autoreset_mode="SameStep") for one in (name, f"{name}+seats"))
+    for envs in (plain, opened):
+        envs.reset(seed=5)
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        played = rng.integers(0, plain.single_action_space.nvec, (4, len(plain.single_action_space.nvec)))
+        (first, *rest, _), (second, *same, _) = plain.step(played), opened.step(played)
+        np.testing.assert_array_equal(first["image"], second["image"])
+        for one, other in zip(rest, same, strict=True):
+            np.testing.assert_array_equal(one, other)
+        assert plain.utterances() == opened.utterances()
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in OPENED if name != "social_env" and "no_social" not in name]
+)
+def test_a_scenario_with_open_seats_is_played_from_the_side_of_others(name: str) -> None:
+    env = make(f"{name}+seats", seats={"agent": "random"})
+    assert env.unwrapped.seat_names != ("agent",)
+    env.reset(seed=1)
+    ended = False
+    while not ended:
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        ended = terminated or truncated
 
 
 SPOKEN_OF = (

@@ -266,9 +266,13 @@ def _show_looks_of_objects(
     row: Row, link: int, viewer: int, image: NDArray[np.uint32], extra: NDArray[np.uint8]
 ) -> None:
     """Show the looks of objects that the picture shows: of several in a cell the last, which lies on top."""
-    if row.program[link + Link.LOOKS] == 0 or not is_present(row, viewer):
+    if row.program[link + Link.LOOKS] == 0:
         return
     carried = carried_by(row, viewer)
+    if not is_present(row, viewer):
+        if carried != 0:  # who has gone still sees what it carries
+            _show_looks(row, link, extra, OWN_PLACE, carried)
+        return
     for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
         place = _place_in_view(row, viewer, entity)
         if entity == carried:

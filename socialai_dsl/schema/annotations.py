@@ -26,7 +26,7 @@ CALLED: Final[dict[type, str]] = {
     s.Step: "a step",
     s.CastMember: "a member of the cast",
     s.Npc: "an npc file",
-    s.Character: "`npc_defaults`",
+    s.NpcDefaults: "`npc_defaults`",
     s.Role: "a role",
     s.WorldRule: "a rule of the world",
     s.Sequence: "a sequence",

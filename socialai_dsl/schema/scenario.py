@@ -444,6 +444,14 @@ class Character(Model):
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 
 
+class NpcDefaults(Character):
+    """What all NPCs have whose own keys say nothing else."""
+
+    seat: Literal["open"] | None = Field(
+        None, description="open: a player outside of the file can play it; the agent always has a seat"
+    )
+
+
 class Npc(Character):
     """A file of its own for one NPC: what it is, with its frames; `one_of` draws it."""
 
@@ -454,15 +462,12 @@ class Npc(Character):
     frames: dict[Word, Frame] = Field(default_factory=dict, description="the frames it brings along")
 
 
-class CastMember(Character):
+class CastMember(NpcDefaults):
     """The agent or an NPC. Keys left out come from the file that `one_of` draws, from its role, from `npc_defaults`,
     then from the defaults of the language.
     """
 
     role: RoleName | None = Field(None, description="the part it plays")
-    seat: Literal["open"] | None = Field(
-        None, description="open: a player outside of the file can play it; the agent always has a seat"
-    )
     one_of: Annotated[
         tuple[Npc, ...] | None,
         BeforeValidator(_as_tuple),
@@ -937,7 +942,7 @@ class Scenario(Model):
         default_factory=dict, description="name: protocol of interaction, which members of the cast follow"
     )
     roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
-    npc_defaults: Character = Field(Character(), description="keys of all NPCs, which each may override")
+    npc_defaults: NpcDefaults = Field(NpcDefaults(), description="keys of all NPCs, which each may override")
     cast: Annotated[dict[MemberName, CastMember], as_written(WrittenCast)] = Field(
         description="who is in the room: the `agent` and the NPCs by name",
         examples=[{"guide": {"frame": "show_the_way"}, "agent": {"place": "anywhere"}}],

@@ -507,7 +507,7 @@ def entities_of(resolver: Resolver) -> Iterator[Entity]:
     symbols = resolver.symbols
     kinds: list[str] = []
     shown = [name for name in symbols.cast if name != AGENT]
-    if any(symbols.scenario.cast[name].seat for name in shown):
+    if any(symbols.cast[name].value("seat") for name in shown):
         shown.append(AGENT)  # others see it
     codes_of = {name: [_code(version, kinds) for version in symbols.cast[name].versions] for name in shown}
     for name in (AGENT, *(n for n in symbols.cast if n != AGENT)):

@@ -23,7 +23,7 @@ def seated(symbols: Symbols) -> tuple[str, ...]:
 
 
 def _has_seat(symbols: Symbols, name: str) -> bool:
-    return symbols.scenario.cast[name].seat == _OPEN
+    return bool(symbols.cast[name].value("seat") == _OPEN)
 
 
 def player_before_the_dot(
