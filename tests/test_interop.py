@@ -27,14 +27,21 @@ EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 NEEDED = {
     "stable_baselines3": "PPO(",
     "sb3_contrib": "RecurrentPPO(",
-    "torchrl": "GymEnv(",
+    "torchrl": "torchrl.envs import",
     "ray": "PPOConfig()",
+    "agilerl": "IPPO(",
 }
-ALSO = {"ray": "tree"}  # Ray without RLlib lacks this one
+ALSO = {"ray": ["tree"], "agilerl": ["pettingzoo", "peft"], "torchrl": ["pettingzoo"]}
+"""What an example needs that does not come with its library: Ray without RLlib lacks the first one."""
+APART = {"ray", "agilerl"}
+"""They start processes or threads, and are to leave nothing behind in this one, nor join anybody else's."""
 NAMES = [f"SocialAI/{name}-v1" for name in IDS]
 
 # Dance tells nothing apart in some channel of a cell, so that its bounds are equal there.
-pytestmark = pytest.mark.filterwarnings("ignore:.*maximum and minimum values are equal")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.*maximum and minimum values are equal"),
+    pytest.mark.filterwarnings("ignore:PettingZoo in TorchRL is tested using"),
+]
 
 
 def needed(example: str) -> str | None:
@@ -50,12 +57,10 @@ def test_every_library_has_an_example() -> None:
 @pytest.mark.parametrize("number", range(len(EXAMPLES)))
 def test_the_examples_run(number: int) -> None:
     library = needed(EXAMPLES[number])
-    for module in filter(None, (library, ALSO.get(library or ""))):
+    for module in filter(None, (library, *ALSO.get(library or "", ()))):
         if find_spec(module) is None:
             pytest.skip(f"{module} is not installed")
-    if (
-        library == "ray"
-    ):  # it starts processes, and is to leave nothing behind in this one, nor join anybody else's
+    if library in APART:
         with tempfile.TemporaryDirectory(prefix="ray") as folder:  # a short path: it holds sockets
             done = subprocess.run(
                 [sys.executable, "-c", EXAMPLES[number]],

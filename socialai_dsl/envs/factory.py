@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.compilation import compile_loaded, scenarios_of
-from socialai_dsl.envs.options import refuse_unknown
+from socialai_dsl.envs.options import UnknownOptionError, refuse_unknown
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.seats import Seating
 from socialai_dsl.envs.starts import check_starts
@@ -153,7 +153,11 @@ _OPTIONS_OF_BATCHES = (
 
 def make_env(scenario: Scenario, render_mode: str | None = None, **unknown: Any) -> ScenarioEnv:
     """Gymnasium's entry point for a single environment."""
-    return make(scenario, render_mode, **unknown)
+    try:
+        return make(scenario, render_mode, **unknown)
+    except UnknownOptionError as error:
+        # Whoever tries options, as TorchRL does, looks for Python's own words.
+        raise UnknownOptionError(f"{error} (unexpected keyword argument {next(iter(unknown))!r})") from None
 
 
 def make_vector_env(scenario: Scenario, num_envs: int = 1, **options: Any) -> ScenarioVectorEnv:

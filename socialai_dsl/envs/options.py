@@ -13,8 +13,12 @@ from socialai_dsl.loader.layouts import read_layout
 from socialai_dsl.source import Source
 
 
+class UnknownOptionError(ValueError, TypeError):
+    """An option that a call does not have. It is a TypeError as well, for libraries that look for Python's own."""
+
+
 def refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str], otherwise: str = "") -> None:
-    """Raise ValueError for the first option that a call does not have, if there is one.
+    """Raise UnknownOptionError for the first option that a call does not have, if there is one.
 
     Args:
         call: what was called.
@@ -25,7 +29,7 @@ def refuse_unknown(call: str, unknown: Mapping[str, Any], known: Sequence[str], 
     for name, given in unknown.items():
         listed = f"some of {', '.join(known)}" if known else "none"
         hint = suggested(str(name), known, f"; expected {listed}{otherwise}", repr)
-        raise ValueError(f"{name}: got {given!r}, but {call} has no such option{hint}")
+        raise UnknownOptionError(f"{name}: got {given!r}, but {call} has no such option{hint}")
 
 
 def check_render_mode(given: Any, modes: Sequence[str]) -> str | None:

@@ -63,6 +63,12 @@ def test_options_of_batches(options: dict[str, Any], message: str) -> None:
             gymnasium.make_vec(DANCE, **options)
 
 
+def test_who_tries_an_option_of_others_learns_so_in_the_words_of_python() -> None:
+    """TorchRL tries `frameskip`, and goes on without it where these words come back."""
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
+        gymnasium.make(DANCE, frameskip=1)
+
+
 def test_only_environments_one_by_one_end_early() -> None:
     with pytest.raises(ValueError, match=r"max_episode_steps: got 5, .*vectorization_mode='sync'"):
         gymnasium.make_vec(TALK, num_envs=2, max_episode_steps=5)
