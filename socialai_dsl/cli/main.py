@@ -27,7 +27,7 @@ _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 _GROUPS: Final = {
     "write scenarios": ("new", "list", "validate", "test", "check", "explain", "show", "fmt"),
     "see them played": ("play", "trace", "replay", "studio"),
-    "train and evaluate agents": ("run", "evaluate", "crossplay", "export", "serve"),
+    "train and evaluate agents": ("run", "evaluate", "crossplay", "words", "export", "serve"),
     "many runs": ("experiment", "report"),
     "editors": ("schema", "lsp"),
 }

@@ -262,6 +262,7 @@ def play_test_set(
     episodes: int,
     trials: int = 1,
     partners: Partners = MappingProxyType({}),
+    observers: Sequence[Observer] = (),
 ) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
@@ -274,6 +275,7 @@ def play_test_set(
         trials: how many in a row the player remembers.
         partners: who sits on other seats than the player. On those that are left it plays as well, a person or a
             language model on the first of them alone.
+        observers: watch as well, where neither a person nor a language model plays.
 
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
@@ -294,7 +296,7 @@ def play_test_set(
         return replace(found, trials=trials)
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
-        result = _result_of(playing, episodes, [kept], trials)
+        result = _result_of(playing, episodes, [kept, *observers], trials)
     told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
     return replace(found, trials=trials, seat=own, partners=partners)

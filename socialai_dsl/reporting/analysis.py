@@ -13,7 +13,7 @@ import pandas as pd
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, RunRecord
 from socialai_dsl.reporting.published import Figure, against_published
-from socialai_dsl.reporting.records import CrossPlayRecord, EndingRecord
+from socialai_dsl.reporting.records import CrossPlayRecord, EndingRecord, WordsRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
     Estimate,
@@ -313,7 +313,7 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
 
 def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
     """Name of a table -> the table: runs, conditions, published, comparisons, rooms, outcomes, results by draws and by
-    seats, cross-play.
+    seats, cross-play, words.
     """
     conditions, sections = analysis.experiment.conditions, analysis.sections
     rows = {
@@ -326,6 +326,7 @@ def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
         "results_by": [row for condition in conditions for row in _results_by(condition)],
         "seats": [row for condition in conditions for row in _seats(condition)],
         "crossplay": [row for one in analysis.experiment.crossplays for row in _pairs(one)],
+        "words": [row for one in analysis.experiment.words for row in _said(one)],
     }
     return {name: pd.DataFrame(some, dtype=object) for name, some in rows.items()}
 
@@ -438,6 +439,31 @@ def _pairs(crossplay: CrossPlayRecord) -> list[dict[str, Any]]:
         }
         for seat, found in crossplay.seats.items()
         for cell in found.cells
+    ]
+
+
+def _said(words: WordsRecord) -> list[dict[str, Any]]:
+    """How often each seat says what where something has a value, and how much its messages tell of that."""
+    return [
+        {
+            "scenario": words.scenario,
+            "seat": seat,
+            "player": found.player,
+            "test_episodes": words.episodes,
+            "situation": one.name,
+            "value": value,
+            "message": message,
+            "episodes": count,
+            **(
+                dict.fromkeys(("bits", "possible", "chance", "p"))
+                if one.told is None
+                else one.told.model_dump()
+            ),
+        }
+        for seat, found in words.seats.items()
+        for one in found.situations
+        for value, said in one.said.items()
+        for message, count in said.items()
     ]
 
 

@@ -20,7 +20,7 @@ from pydantic import TypeAdapter, ValidationError
 from socialai_dsl.errors import UnreadableError
 from socialai_dsl.experiments.folder import RUNS
 from socialai_dsl.experiments.folder import read_experiment as read_document
-from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, RunEntry
+from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, Record, RunEntry
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.records import (
     CrossPlayRecord,
@@ -29,6 +29,7 @@ from socialai_dsl.reporting.records import (
     StartRecord,
     StatusRecord,
     UpdateRecord,
+    WordsRecord,
     described,
 )
 from socialai_dsl.reporting.seeds import read_updates
@@ -42,11 +43,13 @@ from socialai_dsl.runs.folder import (
     STARTS,
     STATUS,
     TESTS,
+    WORDS,
     Run,
 )
 from trainer.config import HYPER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
+Kept = TypeVar("Kept", bound=Record)
 
 _RESULT: Final = TypeAdapter(ResultRecord)
 _STATUS: Final = TypeAdapter(StatusRecord)
@@ -123,7 +126,7 @@ class Experiment:
         name, profile, about: as the experiment says; name and about of a list of runs say that it is one.
         source_sha256: digest of the experiment's file, empty if there is none.
         conditions: in the order of the file.
-        crossplays: of scenarios with several seats, who played how well with whom.
+        crossplays: of scenarios with several seats, who played how well with whom. words: what was said there.
     """
 
     name: str
@@ -132,6 +135,7 @@ class Experiment:
     source_sha256: str
     conditions: tuple[Condition, ...]
     crossplays: tuple[CrossPlayRecord, ...] = ()
+    words: tuple[WordsRecord, ...] = ()
 
     @property
     def scenarios(self) -> list[str]:
@@ -202,7 +206,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
             Condition(entry, tuple(sorted((run for _, run in members), key=lambda r: (r.seed, r.id))))
         )
     if not folders:
-        return Experiment("cross-play", "", "", "", ())
+        return Experiment("several players", "", "", "", ())
     names = f"{len(folders)} runs" if len(folders) > 1 else "one run"
     return Experiment(names, "", "Runs that were given one by one.", "", tuple(conditions))
 
@@ -215,13 +219,31 @@ def read_crossplay(path: Path) -> CrossPlayRecord | None:
         UnreadableError: it is damaged, or something else.
     """
     file = path / CROSSPLAY if path.is_dir() else path
-    if path.is_dir() and not file.exists():
+    if not file.exists() or file.name == WORDS:
         return None
+    return _figures(file, CrossPlayRecord, "socialai crossplay --out")
+
+
+def read_words(path: Path) -> WordsRecord | None:
+    """What `socialai words --out` wrote into a folder or a file; None of a folder without it, and of other files.
+
+    Raises:
+        OSError: it cannot be read.
+        UnreadableError: it is damaged.
+    """
+    file = path / WORDS if path.is_dir() else path
+    if not file.exists() or file.name != WORDS:
+        return None
+    return _figures(file, WordsRecord, "socialai words --out")
+
+
+def _figures(file: Path, record: type[Kept], command: str) -> Kept:
+    """The record that a command wrote into a file."""
     try:
-        return CrossPlayRecord.model_validate_json(file.read_bytes())
+        found: Kept = record.model_validate_json(file.read_bytes())
+        return found
     except ValidationError as error:
-        said = f"expected what `socialai crossplay --out` writes; {described(error)}"
-        raise UnreadableError(f"{file}: {said}") from None
+        raise UnreadableError(f"{file}: expected what `{command}` writes; {described(error)}") from None
 
 
 def _scenario_digest(folder: Path) -> str:

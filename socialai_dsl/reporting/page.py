@@ -32,12 +32,23 @@ from socialai_dsl.reporting.analysis import (
 from socialai_dsl.reporting.collect import RunRecord
 from socialai_dsl.reporting.crossplay import matrix_size
 from socialai_dsl.reporting.published import MARGIN
-from socialai_dsl.reporting.records import CrossPlayRecord, Figures, PartFigures, Rate, ResultRecord
+from socialai_dsl.reporting.records import (
+    CrossPlayRecord,
+    Figures,
+    PartFigures,
+    Rate,
+    ResultRecord,
+    SeatWordsRecord,
+    SituationRecord,
+    WordsRecord,
+)
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
 
 _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
+_MOST_SAID: Final = 8
+"""Messages that have a column of their own."""
 _NONE: Final = "–"
 _RULES_SHOWN: Final = 12
 _DIGEST: Final = 12
@@ -83,6 +94,9 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         crossplays=[
             _crossplay(f"crossplay{number}", found)
             for number, found in enumerate(analysis.experiment.crossplays, start=1)
+        ],
+        words=[
+            _words(f"words{number}", found) for number, found in enumerate(analysis.experiment.words, start=1)
         ],
         endings=[one for section in sections for one in section["endings"]],
         baselines=_baselines(analysis.baselines),
@@ -161,10 +175,9 @@ def _duration(seconds: float) -> str:
 def _lead(analysis: Analysis) -> str:
     """What there is and what it says, in a few sentences of figures."""
     runs, summaries = analysis.experiment.runs, analysis.summaries
-    played = analysis.experiment.crossplays
-    crossplay = "Cross-play of " + ", ".join(scenario_name(one.scenario) for one in played) + "."
-    if played and not runs:
-        return crossplay
+    several = _of_several(analysis)
+    if several and not runs:
+        return several
     states = Counter(_state_of(run) for run in runs)
     finished = states.pop("done", 0)
     others = f" ({', '.join(f'{count} {state}' for state, count in states.items())})" if states else ""
@@ -190,9 +203,19 @@ def _lead(analysis: Analysis) -> str:
     short = sum(bool(s.short) for s in summaries)
     if short:
         parts.append(f"{count_of(short, 'condition')} {'is' if short == 1 else 'are'} too short to judge.")
-    if played:
-        parts.append(crossplay)
+    if several:
+        parts.append(several)
     return " ".join(parts)
+
+
+def _of_several(analysis: Analysis) -> str:
+    """What there is of several players, in a sentence each."""
+    kinds = (("Cross-play", analysis.experiment.crossplays), ("Words", analysis.experiment.words))
+    return " ".join(
+        f"{kind} of {', '.join(scenario_name(one.scenario) for one in found)}."
+        for kind, found in kinds
+        if found
+    )
 
 
 def _state_of(run: RunRecord) -> str:
@@ -491,6 +514,62 @@ def _crossplay(anchor: str, found: CrossPlayRecord) -> dict[str, Any]:
             for cells in zip(*(found.seats[seats[0]].cells for _, seats in groups), strict=True)
         ],
     }
+
+
+def _words(anchor: str, found: WordsRecord) -> dict[str, Any]:
+    """What each seat says: in a sentence, and in a table for each situation of which it tells."""
+    return {
+        "anchor": anchor,
+        "title": f"Words: {scenario_name(found.scenario)}",
+        "episodes": found.episodes,
+        "seats": [_seat_words(seat, said) for seat, said in found.seats.items()],
+        "left_out": ", ".join(found.left_out),
+    }
+
+
+def _seat_words(seat: str, found: SeatWordsRecord) -> dict[str, Any]:
+    messages = list(found.messages)
+    untold = [one.name for one in found.situations if one.told and not one.more_than_chance]
+    alike = found.topographic
+    return {
+        "seat": seat,
+        "lead": f"Played by {found.player}, success {found.success:.3f}. It speaks in {found.spoke:.0%} of the "
+        f"episodes, {found.utterances:.1f} times in each on average."
+        + (f" It says the same everywhere: {messages[0]}." if len(messages) == 1 else ""),
+        "messages": [
+            {"message": text, "share": f"{share:.3f}"}
+            for text, share in list(found.messages.items())[:_MOST_SAID]
+        ],
+        "tables": [
+            (_said_rows(one, messages), _told_of(one)) for one in found.situations if one.more_than_chance
+        ],
+        "untold": ", ".join(untold),
+        "alike": None if alike is None else f"{alike.similarity:.2f} (p {alike.p:.3f})",
+    }
+
+
+def _said_rows(situation: SituationRecord, messages: Sequence[str]) -> Rows:
+    """The share of each message where something has a value."""
+    shown, rest = messages[:_MOST_SAID], messages[_MOST_SAID:]
+    rows = []
+    for value, said in situation.said.items():
+        counts = {text: said.get(text, 0.0) for text in shown}
+        if rest:
+            counts["others"] = sum(said.get(text, 0.0) for text in rest)
+        total = sum(said.values())
+        shares = {text: f"{count / total:.2f}" if total else _NONE for text, count in counts.items()}
+        rows.append({situation.name: value, **shares})
+    return rows
+
+
+def _told_of(situation: SituationRecord) -> str:
+    told = situation.told
+    assert told is not None, "internal: it is told of"
+    names = " = ".join((situation.name, *situation.same))
+    return (
+        f"{names}: the messages tell {told.bits:.2f} of {told.possible:.2f} bits; those of other episodes up to "
+        f"{told.chance:.2f} (95 %), p {told.p:.3f}."
+    )
 
 
 def _seats_text(seats: Sequence[str]) -> str:

@@ -189,6 +189,57 @@ class CrossPlayRecord(Record):
         return [tuple(group) for group in groups]
 
 
+class ToldRecord(Record):
+    """How much messages tell of a situation, in bits; see `evaluation.information.Information`."""
+
+    bits: float
+    possible: float
+    chance: float
+    p: Share
+
+
+class SituationRecord(Record):
+    """What is said where something has each value: how often each message, in episodes."""
+
+    name: str
+    same: list[str]
+    said: dict[str, dict[str, float]] = Field(min_length=1)
+    told: ToldRecord | None
+    more_than_chance: bool
+
+
+class TopographicRecord(Record):
+    """Topographic similarity."""
+
+    similarity: Annotated[float, Field(ge=-1, le=1)]
+    p: Share
+
+
+class SeatWordsRecord(Record):
+    """What a seat says; see `evaluation.words.SeatWords`."""
+
+    player: str
+    success: Share
+    spoke: Share
+    utterances: float = Field(ge=0)
+    messages: dict[str, float] = Field(min_length=1)
+    situations: list[SituationRecord]
+    topographic: TopographicRecord | None
+
+
+class WordsRecord(Record):
+    """`words.json`: what was said on each seat of a scenario in test episodes.
+
+    Attributes:
+        scenario: what was played. seats: the agent's first. left_out: what has too many values.
+    """
+
+    scenario: str
+    episodes: int = Field(ge=1)
+    seats: dict[str, SeatWordsRecord] = Field(min_length=1)
+    left_out: list[str]
+
+
 def described(error: ValidationError) -> str:
     """Where the first mistake of a file is, and what."""
     return ": ".join(filter(None, first_mistake(error.errors())))

@@ -38,7 +38,7 @@ def report(
 
     Args:
         folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`;
-            besides, what `socialai crossplay --out` wrote.
+            besides, what `socialai crossplay --out` and `socialai words --out` wrote.
         out: folder to write (default: `report` in the experiment's folder, or here for runs).
         baselines: whether script, chance and success without NPCs are measured; otherwise only what is known is shown.
         tell: takes a line before each scenario that is measured.
@@ -110,15 +110,19 @@ def require_libraries(*libraries: str) -> None:
 
 def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
     """What the folders hold, and where its report belongs."""
-    from socialai_dsl.reporting.collect import read_crossplay, read_experiment, read_runs
+    from socialai_dsl.reporting.collect import read_crossplay, read_experiment, read_runs, read_words
 
     try:
-        found = {folder: read_crossplay(folder) for folder in folders if folder.exists()}
-        crossplays = tuple(one for one in found.values() if one is not None)
-        runs = [folder for folder in folders if found.get(folder) is None]
+        there = [folder for folder in folders if folder.exists()]
+        words = {folder: said for folder in there if (said := read_words(folder)) is not None}
+        played = {folder: pairs for folder in there if (pairs := read_crossplay(folder)) is not None}
+        runs = [folder for folder in folders if folder not in played and folder not in words]
         if len(runs) == 1 and (runs[0] / EXPERIMENT).exists():
-            return replace(read_experiment(runs[0]), crossplays=crossplays), runs[0]
-        return replace(read_runs(runs), crossplays=crossplays), Path()
+            experiment, place = read_experiment(runs[0]), runs[0]
+        else:
+            experiment, place = read_runs(runs), Path()
+        several = tuple(played.values()), tuple(words.values())
+        return replace(experiment, crossplays=several[0], words=several[1]), place
     except ValueError as error:
         raise UsageError(str(error)) from error
 

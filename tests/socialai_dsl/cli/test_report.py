@@ -32,7 +32,7 @@ def test_everything_is_written(folder: Path, capsys: Capture) -> None:
     assert names == {
         "index.html", "figures",
         "runs.csv", "conditions.csv", "comparisons.csv", "rooms.csv", "outcomes.csv", "published.csv",
-        "results_by.csv", "seats.csv", "crossplay.csv",
+        "results_by.csv", "seats.csv", "crossplay.csv", "words.csv",
     }  # fmt: skip
     page = (out / "index.html").read_text(encoding="utf-8")
     for name in ("part1-success", "part1-curves1", "part1-endings1-1"):

@@ -165,7 +165,7 @@ def test_tables_for_other_programs(analysis: Analysis) -> None:
     }
     assert {name: len(rows) for name, rows in found.items()} == {
         "runs": 7, "conditions": 3, "published": 2, "comparisons": 1, "rooms": 0, "outcomes": 21, "results_by": 0,
-        "seats": 0, "crossplay": 0,
+        "seats": 0, "crossplay": 0, "words": 0,
     }  # fmt: skip
     first = found["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)
