@@ -78,6 +78,28 @@ class Casting:
     others: Mapping[Seat, str] = field(default_factory=dict)
 
 
+class _InPlaceOf:
+    """A person's action for one step. Who stands in for the person looks on, and so can go on later.
+
+    Args:
+        stand_in: who does. action: integers (heads,).
+    """
+
+    def __init__(self, stand_in: str | Policy, action: Sequence[int]) -> None:
+        self._stand_in, self._action = stand_in, np.array(action, np.int64)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """See `Policy.reset`."""
+        if not isinstance(self._stand_in, str):
+            self._stand_in.reset(mask, episodes)
+
+    def act(self, observation: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+        """See `Policy.act`."""
+        if not isinstance(self._stand_in, str):
+            self._stand_in.act(observation)
+        return self._action[None]
+
+
 class Session:
     """The content of a window. Each method that a window may call returns its next content."""
 
@@ -487,7 +509,7 @@ class Session:
         stage, tracing = self._playing()
         for seat, stand_in in (self._filled or {}).items():
             if seat in acts:
-                stage.env.fill_seat(seat, ReplayedPolicy([np.array(acts[seat], np.int64)]))
+                stage.env.fill_seat(seat, _InPlaceOf(stand_in, acts[seat]))
                 tracing.tracer.players[seat] = _PERSON
             elif tracing.tracer.players[seat] == _PERSON:
                 stage.env.fill_seat(seat, stand_in)

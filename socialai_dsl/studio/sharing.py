@@ -147,7 +147,9 @@ class SharedGame:
         waits = [guest for guest in self._guests.values() if guest.plays and guest.chosen is None]
         if self._own is not None and not waits:
             self._step(self._own)
-        elif self._timer is None and self.seconds is not None and (self._own or self._choices()):
+        elif self._own is None and not self._choices():
+            self._stop_waiting()
+        elif self._timer is None and self.seconds is not None:
             self._timer = asyncio.get_running_loop().call_later(self.seconds, self._time_out)
         self._say_who_chooses()
 
@@ -177,10 +179,13 @@ class SharedGame:
             self._tell(Refused(id=self._own.id, refused=why).model_dump_json())
             self._own = None
 
-    def _forget(self) -> None:
+    def _stop_waiting(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+
+    def _forget(self) -> None:
+        self._stop_waiting()
         for guest in self._guests.values():
             guest.chosen = None
 

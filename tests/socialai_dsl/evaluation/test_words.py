@@ -113,6 +113,14 @@ def test_the_command_prints_a_table_and_leaves_the_figures(
     assert json.loads(capsys.readouterr().out) == json.loads((out / WORDS).read_text(encoding="utf-8"))
 
 
+def test_the_page_shows_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "partners.md").read_text(encoding="utf-8")
+    section = page[page.index("\n## Words\n") :]
+    shown = section[section.index("```text\n") + 8 :].partition("```")[0]
+    assert main(["words", "oracle", "--on", REFERENCE, "--episodes", "200"]) == 0
+    assert shown.strip() in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("asked", "message"),
     [

@@ -407,6 +407,38 @@ def test_the_other_seat_is_played_by_whom_one_chooses_also_after_steps_back(
     assert levers._playing()[1].tracer.trace().players == {"partner": who}
 
 
+def test_who_stands_in_for_a_person_goes_on_as_if_it_had_looked_on(levers: Session) -> None:
+    """A policy that remembers is asked in every step, whoever plays, and taken back with the steps."""
+    begun = levers.begin(Room(seed=5), others={"partner": "random"})["episode"]
+    assert begun["others"] == {"partner": "random"}
+    levers._filled, memory = {"partner": (counting := _Counting())}, counting.seen
+    levers._let_sit({})
+    stage, tracing = levers._playing()
+    stage.env.fill_seat("partner", counting)
+    for step in range(4):
+        acts = {"partner": [0, 0, 0, 0]} if step in (1, 2) else {}
+        moment = levers.act("forward", acts=acts)["more"]["moments"][0]
+        assert (moment["seats"][0]["did"] == "left") is bool(acts), "the person turns, and nobody else does"
+        assert len(memory) == step + 1
+    assert tracing.tracer.trace().players == {"partner": "a person"}
+    levers.begin(Room(seed=5), others={"partner": "random"})
+    assert tracing.tracer.trace().players == {"partner": "random"}
+
+
+class _Counting:
+    """A policy that goes nowhere and remembers what it has seen."""
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def reset(self, mask: Any, episodes: Any = None) -> None:
+        self.seen.clear()
+
+    def act(self, observation: Any) -> Any:
+        self.seen.append(observation)
+        return np.array([[4, 0, 0, 0]])
+
+
 def test_everybody_is_seen_as_the_engine_has_it_whoever_plays(levers: Session) -> None:
     levers.begin(Room(seed=5), seat="partner", others={"agent": "random"})
     for _ in range(5):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -104,6 +105,18 @@ def test_who_leaves_or_is_late_is_stood_in_for(client: Client) -> None:
         window.ask("begin", room={"seed": 3})
         again = [moments(window.ask("act"))[0]["seats"][0]["did"] for _ in range(3)]
         assert again == scripted
+
+
+def test_nothing_is_played_for_one_who_has_left(client: Client) -> None:
+    with host(client) as window:
+        code = window.ask("invite", seat="partner", seconds=1.0)["code"]
+        with guest(client, code) as other:
+            other.hears("glance")
+            other.ask("choose")
+        window.hears("guests", chosen={})
+        time.sleep(1.5)
+        assert moments(window.ask("act"))[0]["t"] == 1
+        assert window.told == []
 
 
 def test_what_was_chosen_for_a_step_counts_for_no_other(client: Client) -> None:
