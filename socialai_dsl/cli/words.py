@@ -15,6 +15,8 @@ from socialai_dsl.runs.folder import WORDS
 from socialai_dsl.runs.words import words
 
 SUMMARY: Final = "find what players say in which situation, and how much that tells of it"
+_TABLES: Final = 4
+"""Situations that have a table, of those that are told most of."""
 _MOST: Final = 8
 """Messages that have a column of their own."""
 
@@ -66,9 +68,11 @@ def _seat(seat: str, found: SeatWords) -> Iterator[str]:
         return
     most = list(found.messages.items())[:_MOST]
     yield f"  says {', '.join(f'{text} ({share:.0%})' for text, share in most)}"
-    for one in found.situations:
-        if one.more_than_chance:
-            yield from ("", *(f"  {line}" for line in _table(one, list(found.messages))))
+    told = [one for one in found.situations if one.more_than_chance]
+    for one in told[:_TABLES]:
+        yield from ("", *(f"  {line}" for line in _table(one, list(found.messages))))
+    if told[_TABLES:]:
+        yield from ("", *(f"  {_figures(one)}" for one in told[_TABLES:]))
     untold = [one.name for one in found.situations if not one.more_than_chance]
     if untold:
         yield ""
@@ -81,15 +85,19 @@ def _seat(seat: str, found: SeatWords) -> Iterator[str]:
 
 def _table(situation: Situation, messages: list[str]) -> Iterator[str]:
     """The share of each message where something has a value, and how much it is told of."""
-    assert situation.told is not None, "internal: it is told of"
     shown, rest = messages[:_MOST], messages[_MOST:]
-    names = " = ".join((situation.name, *situation.same))
     rows = [[situation.name, *shown, *(["others"] if rest else [])]]
     for value, said in situation.said.items():
         counts = [said.get(text, 0.0) for text in shown]
         counts += [sum(said.get(text, 0.0) for text in rest)] if rest else []
         total = sum(said.values())
         rows.append([value, *(f"{count / total:.2f}" if total else "-" for count in counts)])
-    told = situation.told
-    yield f"{names}: {told.bits:.2f} of {told.possible:.2f} bits (chance {told.chance:.2f}, p {told.p:.3f})"
+    yield _figures(situation)
     yield from columns(rows)
+
+
+def _figures(situation: Situation) -> str:
+    told = situation.told
+    assert told is not None, "internal: it is told of"
+    names = " = ".join((situation.name, *situation.same))
+    return f"{names}: {told.bits:.2f} of {told.possible:.2f} bits (chance {told.chance:.2f}, p {told.p:.3f})"

@@ -47,6 +47,8 @@ from socialai_dsl.reporting.style import scenario_name
 from socialai_dsl.runs.folder import REPLAY
 
 _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
+_MOST_TABLES: Final = 4
+"""Situations whose tables stand open, of those that are told most of."""
 _MOST_SAID: Final = 8
 """Messages that have a column of their own."""
 _NONE: Final = "–"
@@ -530,6 +532,8 @@ def _words(anchor: str, found: WordsRecord) -> dict[str, Any]:
 def _seat_words(seat: str, found: SeatWordsRecord) -> dict[str, Any]:
     messages = list(found.messages)
     untold = [one.name for one in found.situations if one.told and not one.more_than_chance]
+    told = [one for one in found.situations if one.more_than_chance]
+    tables = [(_said_rows(one, messages), _told_of(one)) for one in told]
     alike = found.topographic
     return {
         "seat": seat,
@@ -540,9 +544,8 @@ def _seat_words(seat: str, found: SeatWordsRecord) -> dict[str, Any]:
             {"message": text, "share": f"{share:.3f}"}
             for text, share in list(found.messages.items())[:_MOST_SAID]
         ],
-        "tables": [
-            (_said_rows(one, messages), _told_of(one)) for one in found.situations if one.more_than_chance
-        ],
+        "tables": tables[:_MOST_TABLES],
+        "further": tables[_MOST_TABLES:],
         "untold": ", ".join(untold),
         "alike": None if alike is None else f"{alike.similarity:.2f} (p {alike.p:.3f})",
     }
