@@ -19,6 +19,7 @@ from socialai_dsl.cli.arguments import (
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options
 from socialai_dsl.cli.terminal import json_text
+from socialai_dsl.episodes.partners import called
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.test_set import Evaluation
@@ -152,5 +153,5 @@ def _company(evaluation: Evaluation) -> list[str]:
     """Who sat where, if anybody was named."""
     if not evaluation.partners:
         return []
-    partners = [f"{seat} by {player.agent}" for seat, player in evaluation.partners.items()]
+    partners = [f"{seat} by {called(player)}" for seat, player in evaluation.partners.items()]
     return [f"on the seat of {evaluation.seat}", *partners]

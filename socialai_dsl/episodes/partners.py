@@ -74,6 +74,11 @@ def pools_of(named: Named, scenario: str, program: Playable) -> dict[Seat, list[
     return found
 
 
+def called(player: Player) -> str:
+    """What is said of a seat alone to mean this player."""
+    return SCRIPT if player.is_script else player.agent
+
+
 def _meant(name: str | Player, scenario: str) -> Player:
     if isinstance(name, Player):
         return name

@@ -63,7 +63,7 @@ class Summary:
             )
             for test in entry.tests
         }
-        played = [figures.by_seat for figures in done]
+        played = [run.result.by_seat for run in condition.done if run.result is not None]
         self.seats = {
             seat: pd.Series([seats[seat].success_rate for seats in played if seat in seats], dtype=float)
             for seat in dict.fromkeys(seat for seats in played for seat in seats)
@@ -419,8 +419,8 @@ def _seats(condition: Condition) -> list[dict[str, Any]]:
             "success_rate": part.success_rate,
         }
         for run in condition.done
-        if run.figures is not None
-        for seat, part in run.figures.by_seat.items()
+        if run.result is not None
+        for seat, part in run.result.by_seat.items()
     ]
 
 

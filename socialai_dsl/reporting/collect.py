@@ -46,7 +46,7 @@ from socialai_dsl.runs.folder import (
     WORDS,
     Run,
 )
-from trainer.config import HYPER, RunConfig, configure, scenario_in
+from trainer.config import HYPER, PARTNERS_FOLDER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
 Kept = TypeVar("Kept", bound=Record)
@@ -257,7 +257,22 @@ def _scenario_digest(folder: Path) -> str:
 def _column(settings: Mapping[str, Any]) -> str:
     """Who played, and what of it is not the default."""
     who = str(settings.get("agent", "ppo"))
-    return ", ".join([str(settings.get("algorithm", who)) if who == "ppo" else who, *unusual(settings)])
+    named = str(settings.get("algorithm", who)) if who == "ppo" else who
+    return ", ".join([named, *unusual(settings), *_partners(settings.get("seats"))])
+
+
+def _partners(seats: Any) -> Iterator[str]:
+    """Who had other seats, each by member; several take turns."""
+    if isinstance(seats, Mapping):
+        for seat, names in seats.items():
+            players = [_label(str(name)) for name in names] if isinstance(names, list) else []
+            yield f"{seat} by {' or '.join(players)}"
+
+
+def _label(player: str) -> str:
+    """What somebody is called; a network's copy has its seat and place before its name."""
+    is_copy = Path(player).parts[:1] == (PARTNERS_FOLDER,)
+    return Path(player).stem.split("-", 2)[-1] if is_copy else player
 
 
 def _granted(result: ResultRecord | None) -> Iterator[str]:

@@ -45,7 +45,7 @@ class Figures(Record):
         actions: how they came about, in a phrase.
         trials: in order, where players remembered several episodes in a row.
         results_by: draw -> value -> what came of the episodes with it.
-        seats: of several seats, each but the agent's -> what came of the episodes for it.
+        seats: of several seats, each but the player's own -> what came of the episodes for it.
         replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
             `cost` in US dollars, None where prices are not known.
     """
@@ -69,12 +69,6 @@ class Figures(Record):
     results_by: dict[str, dict[str, PartFigures]] = Field(default_factory=dict)
     seats: dict[str, PartFigures] = Field(default_factory=dict)
 
-    @property
-    def by_seat(self) -> dict[str, PartFigures]:
-        """What came of the episodes for each seat, the agent first; nothing where it alone has one."""
-        own = PartFigures(episodes=self.episodes, success_rate=self.success_rate)
-        return {"agent": own, **self.seats} if self.seats else {}
-
 
 class ResultRecord(Record):
     """`result.json`, in one form for all players.
@@ -85,6 +79,7 @@ class ResultRecord(Record):
         tell, told: what the player was told of the task, by member of a suite if they differ. language: of that, where
             the file says it. view: what the player saw.
         trials: how many episodes in a row it remembered.
+        seat: the one that it had.
     """
 
     kind: str = ""
@@ -94,12 +89,19 @@ class ResultRecord(Record):
     language: str = ""
     view: str = "seat"
     trials: int = Field(1, ge=1)
+    seat: str = "agent"
     frames: int = 0
     train_seconds: float = 0.0
     frames_per_second: float | None = None
     eval: Figures
     program_sha256: str = ""
     versions: dict[str, str] = Field(default_factory=dict)
+
+    @property
+    def by_seat(self) -> dict[str, PartFigures]:
+        """What came of the episodes for each seat, the player's own first; nothing where there is one."""
+        own = PartFigures(episodes=self.eval.episodes, success_rate=self.eval.success_rate)
+        return {self.seat: own, **self.eval.seats} if self.eval.seats else {}
 
 
 class StatusRecord(Record):

@@ -11,6 +11,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
 from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
+from socialai_dsl.episodes.players import MODEL_PREFIX
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
@@ -64,7 +65,7 @@ def keep_run(folder: Path, config: RunConfig, loaded: Loaded) -> RunConfig:
         UsageError, OSError: something cannot be copied.
     """
     kept = config.model_copy(update={"scenario": keep_scenario(folder, config.scenario, loaded).scenario})
-    kept = kept.model_copy(update={"seats": _keep_partners(folder, config.seats)}).within(folder)
+    kept = kept.model_copy(update={"seats": keep_partners(folder, config.seats)}).within(folder)
     phases = Path(config.curriculum)
     beside = phases.parent.resolve() == config.code_folder.resolve()
     own = bool(config.own_classes)
@@ -78,11 +79,22 @@ def keep_run(folder: Path, config: RunConfig, loaded: Loaded) -> RunConfig:
     return kept.within(folder, config.code_folder) if own else kept
 
 
-def _keep_partners(folder: Path, seats: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """Copy the networks that play on other seats. Returns how all players there are called in the folder."""
+def keep_partners(folder: Path, seats: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Copy the networks that play on other seats into a folder that is about them.
+
+    Args:
+        folder: is there.
+        seats: who plays which, by name.
+
+    Returns:
+        How all players there are called in the folder.
+
+    Raises:
+        UsageError: an agent cannot be read.
+    """
 
     def kept(seat: str, place: int, name: str) -> str:
-        if name in (SCRIPT, RANDOM, NOBODY) or name.startswith(PREFIX):
+        if name in (SCRIPT, RANDOM, NOBODY) or name.startswith((PREFIX, MODEL_PREFIX)):
             return name
         from trainer import checkpoint as checkpoints
         from trainer.errors import CheckpointError

@@ -13,7 +13,7 @@ from socialai_dsl.atomic import read_json, write_json
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import refuse_unknown
-from socialai_dsl.episodes.partners import partners_of
+from socialai_dsl.episodes.partners import called, partners_of
 from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
     MODEL_PREFIX,
@@ -30,7 +30,7 @@ from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
 from socialai_dsl.frontend import load
 from socialai_dsl.model_options import ModelOptions
-from socialai_dsl.runs.copies import keep_scenario
+from socialai_dsl.runs.copies import keep_partners, keep_scenario
 from socialai_dsl.runs.folder import (
     CONFIG,
     EVALUATIONS,
@@ -159,7 +159,8 @@ def _evaluated(
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
     program = compiled(loaded)
-    asked = program, episodes, trials, partners_of(seats, scenario, program)
+    partners = partners_of(seats, scenario, program)
+    asked = program, episodes, trials, partners
     if out is None:
         return play_test_set(playing, scenario, loaded, *asked)
     place = out / scenario_folder_name(scenario)
@@ -167,6 +168,10 @@ def _evaluated(
         kept = keep_scenario(place, scenario, loaded).scenario
         # As a run that trained nothing, so that reports take it as one.
         settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
+        if partners:
+            settings |= {
+                "seats": keep_partners(place, {seat: [called(one)] for seat, one in partners.items()})
+            }
         write_json(place / CONFIG, settings)
         made.update(place.iterdir())
         played = play_test_set(playing, scenario, loaded, *asked)
@@ -300,7 +305,7 @@ def _seats(evaluation: Evaluation) -> dict[str, Any]:
     """On which seat the player sat, and with whom, if anybody was named."""
     if not evaluation.partners:
         return {}
-    partners = {seat: short_name(player.agent) for seat, player in evaluation.partners.items()}
+    partners = {seat: short_name(called(player)) for seat, player in evaluation.partners.items()}
     return {"seat": evaluation.seat, "partners": partners}
 
 

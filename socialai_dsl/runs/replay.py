@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from socialai_dsl.atomic import write_text
 from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
+from socialai_dsl.episodes.partners import Named, partners_of
 from socialai_dsl.episodes.players import Agent, Player, folder_of, named_agent
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError, first_mistake
@@ -112,7 +113,7 @@ def _played(
 ) -> list[Trace]:
     """Those episodes that were asked for, or successes and failures, of a run or a scenario."""
     evaluation: Evaluation | None = None
-    trials = 1
+    trials, named = 1, list[tuple[str, str]]()
     if (folder_of(source) / CONFIG).is_file():
         if agent is not None:
             raise OptionError(
@@ -121,16 +122,19 @@ def _played(
         folder, scenario = folder_of(source), own_scenario(source)
         evaluation = _kept(folder, scenario, episodes if numbers is None else max(numbers) + 1, greedy)
         player = made_player(source, [], _greedy(greedy), None) if evaluation is None else evaluation.player
-        trials = (Run(folder).result or {}).get("trials", 1)
+        run = Run(folder)
+        trials = (run.result or {}).get("trials", 1)
+        named = [(seat, names[0]) for seat, names in run.config.partners.items()]
     else:
         scenario, player = source, _player_of_scenario(source, agent, greedy)
     if evaluation is None:
         # What a policy of one's own does may depend on all that it played before.
         if numbers is not None and player.policy is None:
-            return _alone(player, scenario, numbers, trials)
+            return _alone(player, scenario, numbers, trials, named)
         loaded, count = load(scenario), episodes if numbers is None else max(numbers) + 1
-        whole = -(-count // trials) * trials
-        evaluation = play_test_set(player, scenario, loaded, compiled(loaded), whole, trials)
+        program, whole = compiled(loaded), -(-count // trials) * trials
+        partners = partners_of(named, scenario, program)
+        evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners)
     _warn(evaluation.warnings)
     if numbers is None:
         return evaluation.traces(evaluation.to_replay(record))
@@ -143,13 +147,15 @@ def _played(
     return evaluation.traces(numbers)
 
 
-def _alone(player: Player, scenario: str, numbers: Sequence[int], trials: int) -> list[Trace]:
+def _alone(player: Player, scenario: str, numbers: Sequence[int], trials: int, named: Named) -> list[Trace]:
     """These test episodes, without playing others than those of their sessions."""
     for number in numbers:
         if not 0 <= number < MOST_EPISODES:
             raise OptionError("test_episode", f"got {number}, expected 0 to {MOST_EPISODES - 1}")
     loaded = load(scenario)
-    traces, told = trace_test_episodes(player, scenario, loaded, compiled(loaded), numbers, trials)
+    program = compiled(loaded)
+    partners = partners_of(named, scenario, program)
+    traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials, partners)
     _warn(told, callers=5)
     return traces
 

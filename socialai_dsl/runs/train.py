@@ -19,7 +19,7 @@ from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.factory import compiled, make_vec
 from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
-from socialai_dsl.episodes.partners import pools_of, seats_with
+from socialai_dsl.episodes.partners import called, pools_of, seats_with
 from socialai_dsl.episodes.play import AGENT, Seat
 from socialai_dsl.episodes.players import Player, folder_of, named_agent, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
@@ -201,11 +201,8 @@ def _with_partners(config: RunConfig, program: Playable) -> RunConfig:
                 raise OptionError(
                     "seat", f"got {player.agent!r} for {seat}, expected script, random or a trained agent"
                 )
-    called = {
-        seat: [SCRIPT if player.is_script else player.agent for player in players]
-        for seat, players in pools.items()
-    }
-    return config.model_copy(update={"seats": called})
+    names = {seat: [called(player) for player in players] for seat, players in pools.items()}
+    return config.model_copy(update={"seats": names})
 
 
 def _pools(config: RunConfig, program: Playable) -> dict[Seat, list[Player]]:

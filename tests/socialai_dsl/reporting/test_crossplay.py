@@ -98,6 +98,33 @@ def test_it_is_a_section_beside_runs(tmp_path: Path) -> None:
     assert [(row["seat"], row["success_rate"]) for row in seats[:2]] == [("agent", "0.4"), ("bob", "0.25")]
 
 
+def test_evaluations_with_other_partners_or_on_another_seat_are_other_conditions(tmp_path: Path) -> None:
+    for number, (seat, partners) in enumerate(
+        [
+            ("agent", {"bob": ["script"]}),
+            ("agent", {"bob": ["partners/bob-0-help.safetensors"]}),
+            ("bob", {"agent": ["random"]}),
+        ]
+    ):
+        run = write_run(tmp_path / f"run{number}", "game", 0, 0.5)
+        for name, more in (
+            ("config.json", {"agent": "oracle", "seats": partners}),
+            ("result.json", {"seat": seat}),
+        ):
+            found = json.loads((run / name).read_text()) | more
+            if name == "result.json":
+                (other,) = partners
+                found["eval"]["seats"] = {other: {"episodes": 500, "success_rate": 0.25}}
+            (run / name).write_text(json.dumps(found))
+    runs = sorted(map(str, tmp_path.glob("run*")))
+    assert main(["report", *runs, "--no-baselines", "--out", str(tmp_path / "report")]) == 0
+    page = Page((tmp_path / "report" / "index.html").read_text(encoding="utf-8"))
+    for column in ("bob by script", "bob by help", "agent by random"):
+        assert f"oracle, {column}" in page.text
+    seats = list(csv.DictReader((tmp_path / "report" / "seats.csv").read_text().splitlines()))
+    assert [(row["seat"], row["success_rate"]) for row in seats[-2:]] == [("bob", "0.5"), ("agent", "0.25")]
+
+
 def test_it_stands_alone_and_with_runs_that_belong_to_no_experiment(tmp_path: Path) -> None:
     there = write(tmp_path / "both", played(["script"], "agent", "bob"))
     for given in ([there / "crossplay.json"], [there, write_run(tmp_path / "run", "help", 0, 0.5)]):

@@ -30,10 +30,12 @@ def a_person_who_walks_on(
     briefing: Any,
     view: str,
     practice: bool,
+    seats: Any,
+    loaded: Any,
 ) -> list[FinishedEpisode]:
     """In place of the terminal: the same game and journal, without a screen."""
     played: list[FinishedEpisode] = []
-    game = Game(scenario, briefing)
+    game = Game(scenario, briefing, seats, loaded)
     with Journal(folder / FILE, {**about, **game.briefing.record(), "view": view}) as game.journal:
         for number in range(EPISODES):
             asked = episodes(number)

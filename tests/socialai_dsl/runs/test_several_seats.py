@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,23 @@ def test_a_run_goes_on_as_one_that_never_stopped(tmp_path: Path) -> None:
 def test_rows_that_are_no_whole_games(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected a multiple of the 3 seats: agent, bob, cat"):
         sd.train("together/commons_together", out=tmp_path / "run", frames=2048, **OPTIONS)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seats", [{"partner": "script"}, {"agent": "random"}, {"partner": "run"}])
+def test_an_evaluation_is_replayed_with_the_partners_that_it_had(
+    seats: dict[str, str], run: sd.Run, tmp_path: Path
+) -> None:
+    """Also where the folder of a trained partner is gone since."""
+    moved = tmp_path / "moved"
+    shutil.copytree(run.folder, moved)
+    named = {seat: str(moved) if name == "run" else name for seat, name in seats.items()}
+    played = sd.evaluate(
+        "random", "together/levers_together", episodes=4, out=tmp_path / "out", seats=named, seed=3
+    )
+    shutil.rmtree(moved)
+    folder = tmp_path / "out" / "levers_together"
+    traces = sd.replay(folder, episodes=4)
+    assert sorted(len(trace.moments) - 1 for trace in traces) == sorted(played.result.lengths.tolist())
+    (alone,) = sd.replay(folder, test_episodes=[2])
+    assert alone.moments == played.traces([2])[0].moments
+    assert (alone.own, alone.agent) == (played.seat, "random")
