@@ -286,13 +286,18 @@ def conclude(row: Row, frame: int, table: int, heard: int, chosen: bool, flags: 
 
 
 @merged
-def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
-    """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves."""
+def _follow(row: Row, frame: int, npc: int, flags: int, begins: np.bool_) -> None:
+    """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves.
+
+    In the first of its frames, what it did last is that of its last turn until it moves.
+    """
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
     perceive(row, frame, flags)
     table = state_table(row, frame)
     pc = row.program[table + 1 + heard]
     chosen = notice(row, pc)
+    if begins:
+        set_field(row, npc, Field.LAST, STILL)
     if pc != 0 or row.program[table] != 0 or flags & Trait.APART:
         if not is_present(row, npc):
             return
@@ -347,16 +352,17 @@ def take_turns(row: Row) -> None:
     while number < frames:
         npc = row.program[frame + FrameColumn.ENTITY]
         seat = taken_seat_of(row, npc)
-        if npc != last:
-            if seat == 0:
-                set_field(row, npc, Field.LAST, STILL)
-                set_field(row, npc, Field.TOGGLED, ZERO)
-            last = npc
+        begins = npc != last
+        last = npc
+        if begins and seat == 0:
+            set_field(row, npc, Field.TOGGLED, ZERO)
         if is_present(row, npc):
             if seat == 0:
-                _follow(row, frame, npc, flags)
+                _follow(row, frame, npc, flags, begins)
             else:
                 _accompany(row, frame, npc, seat, flags)
+        elif begins and seat == 0:
+            set_field(row, npc, Field.LAST, STILL)
         number += 1
         inbox = row.program[frame + FrameColumn.INBOX]
         frame += FrameColumn.COLUMNS

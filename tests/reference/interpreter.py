@@ -357,6 +357,7 @@ class Reference:
             runner.end(turn)
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
+            npc.action = npc.last_act = "none"
         if turn.say is not None and not npc.taken:
             speech.speak(self.world, npc, turn.say, turn.filled, turn.to, turn.tone)
 
