@@ -61,7 +61,7 @@ class Window:
     """Asks questions over a connection, and waits for the answer of each; what nobody has asked for is kept."""
 
     def __init__(self, opened: Any) -> None:
-        self.opened, self.number = opened, 0
+        self.opened, self.number = opened, 1000  # hostile messages have small numbers
         self.told: list[dict[str, Any]] = []
 
     def ask(self, do: str, /, **more: Any) -> dict[str, Any]:

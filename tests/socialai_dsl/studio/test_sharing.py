@@ -5,11 +5,12 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
 
 import socialai_dsl as sd
 from socialai_dsl.llm import TextView
@@ -20,6 +21,7 @@ for module in ("uvicorn", "starlette", "websockets"):
 from websockets.exceptions import ConnectionClosed  # noqa: E402
 
 from tests.socialai_dsl.studio.clients import Client, Window, serving  # noqa: E402
+from tests.socialai_dsl.studio.hostile import FILES, GAME, texts  # noqa: E402
 
 NAME = "levers_together.yaml"
 FILE = Path(__file__).parents[3] / "scenarios" / "together" / NAME
@@ -188,6 +190,24 @@ def test_a_link_gives_one_seat_as_long_as_the_window_is_open(client: Client) -> 
         pass
     assert client.get("/guest?code=x").status == 200
     assert client.get("/guest?code=x", host="evil.example").status == 403
+
+
+def test_whatever_a_guest_sends_is_refused_and_the_game_goes_on(client: Client) -> None:
+    with host(client) as window:
+        code = window.ask("invite", seat="partner")["code"]
+        with guest(client, code) as other:
+            other.hears("glance")
+
+            @settings(max_examples=100, derandomize=True, deadline=None)
+            @given(texts([{"do": "choose", "movement": "left"}, *GAME, *FILES]))
+            def each(text: str) -> None:
+                with suppress(UnicodeEncodeError):
+                    other.opened.send(text)
+
+            each()
+            other.opened.send(b"\xff\x00")
+            assert "action" in other.ask("choose", movement="right")
+            assert moments(window.ask("act"))[0]["seats"][0]["did"] == "right"
 
 
 def test_the_others_are_told_when_the_window_is_closed(client: Client) -> None:
