@@ -108,6 +108,8 @@ def seats_with(pools: Mapping[Seat, Sequence[Player]], program: Playable) -> dic
             ]
             for seat, players in pools.items()
         }
+    except UsageError:
+        raise
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:
@@ -189,6 +191,8 @@ def _filled(partners: Partners, program: Playable) -> dict[Seat, str | Policy]:
     env = make(program)
     try:
         return {seat: _filling(player, seat, program, env) for seat, player in partners.items()}
+    except UsageError:
+        raise
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:

@@ -44,7 +44,7 @@ class Tracing(Observer):
         tracer: gets every moment.
         title: which episode it is, in words.
         think: what the agent makes of an observation.
-        replies: what a language model answered before each action.
+        replies: what language models answered before each action.
 
     Attributes:
         thought: what the agent made of the moment before the next step, where `think` does not say.
@@ -127,8 +127,8 @@ def trace_of(
         about: a sentence about the scenario.
         think: returns the `Thought` of a trained agent about an observation; called in each moment before a step, in
             order.
-        replies: of a language model, for each action the pairs of reply and error before it, and perhaps one more entry
-            after the last action.
+        replies: of language models, for each action what they answered before it, and perhaps one more entry after the
+            last action.
         cut_short: the outcome of an episode that no step ended.
         players: who has the other seats, for people.
 

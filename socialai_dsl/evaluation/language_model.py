@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib.util import find_spec
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from reprlib import repr as shortened
@@ -31,6 +32,7 @@ from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces.endings import Ending
+from socialai_dsl.traces.tracing import Answers
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint
@@ -50,14 +52,14 @@ class ModelEpisodes:
     Attributes:
         result: as for all agents.
         actions: of each episode, int64 (heads,) each, of several seats (S, heads).
-        replies: what the model whose results these are answered before each of them.
+        replies: what the models answered before each of them.
         endings: further ways in which episodes ended. figures: further ones.
         own: the seat whose results these are. players: who sat on all seats, if there are several.
     """
 
     result: EvalResult
     actions: dict[int, list[NDArray[np.int64]]]
-    replies: dict[int, list[list[tuple[str, str]]]]
+    replies: dict[int, list[Answers]]
     endings: list[Ending]
     figures: dict[str, Any]
     own: Seat = AGENT
@@ -298,11 +300,21 @@ def _outcome(
     return ModelEpisodes(
         result,
         {game.number: game.actions for game in played},
-        {game.number: game.models[own].replies for game in played if own in game.models},
+        {game.number: _answers(game, own) for game in played},
         endings,
         figures.get(own, {}) | ({"models": beside} if beside else {}) | dict(more),
         own,
     )
+
+
+def _answers(game: "PlayedGame", own: Seat) -> list[Answers]:
+    """What the models answered before each action; on which seat, unless the player in question alone is one."""
+    alone = set(game.models) == {own}
+    of_seats = [
+        [[(text, error, None if alone else seat) for text, error in told] for told in episode.replies]
+        for seat, episode in game.models.items()
+    ]
+    return [[one for told in step for one in told] for step in zip_longest(*of_seats, fillvalue=[])]
 
 
 def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:

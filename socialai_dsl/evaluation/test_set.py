@@ -39,6 +39,7 @@ from socialai_dsl.program_suite import Playable, ProgramSuite, has_script, prefi
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
+from socialai_dsl.traces.tracing import Answers
 
 if TYPE_CHECKING:  # it needs Textual
     from socialai_dsl.play.game import FinishedEpisode
@@ -75,7 +76,7 @@ class _Played:
         self,
         numbers: Sequence[int],
         texts: Mapping[str, str],
-        replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = MappingProxyType({}),
+        replies: Mapping[int, Sequence[Answers]] = MappingProxyType({}),
         cut_short: Mapping[int, str] = MappingProxyType({}),
     ) -> list[Trace]:
         """See `Evaluation.traces`.
@@ -143,7 +144,7 @@ class Evaluation:
         actions: of each episode, int64 (heads,) each.
         warnings: what the agent's checkpoint does not know of this scenario, and the like.
         more: figures that count for this agent alone.
-        replies: of a language model, what it answered before each action of each episode.
+        replies: of language models, what they answered before each action of each episode.
         folder: where it is kept, if it is. kept: the name that the scenario has there.
         trials: how many episodes in a row the player remembered.
         briefing: what the player was told of the task.
@@ -160,7 +161,7 @@ class Evaluation:
     actions: Mapping[int, list[NDArray[np.int64]]]
     warnings: Sequence[str] = field(default_factory=tuple)
     more: Mapping[str, Any] = field(default_factory=dict)
-    replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
+    replies: Mapping[int, Sequence[Answers]] = field(default_factory=dict)
     folder: Path | None = None
     kept: str | None = None
     trials: int = 1

@@ -118,10 +118,16 @@ class Thought(_Part):
 
 
 class Reply(_Part):
-    """The end of what a language model answered, and what was wrong with it; empty if it gives an action."""
+    """The end of what a language model answered.
+
+    Attributes:
+        text: the end of it. error: what was wrong with it; empty if it gives an action.
+        seat: of the model, unless it is the player that the trace is about, and no other is one.
+    """
 
     text: str
     error: str = ""
+    seat: str | None = None
 
 
 class SeatPart(_Part):
@@ -176,7 +182,7 @@ class Moment(_Part):
         seats: the same for the other seats of the trace, in their order.
         fired: numbers of rules. others: pairs of a rule that was asked and did not fire, and the number of its reason.
         thought: what the player made of the moment before, from which its action was chosen.
-        replies: what a language model answered to the moment before, until it gave an action or its turn passed.
+        replies: what language models answered to the moment before, until they gave an action or their turn passed.
         ended: how the episode ended in this step, for the agent.
     """
 

@@ -33,8 +33,8 @@ from socialai_dsl.traces.steps import describe_step, heard_line
 from socialai_dsl.vocabulary import NOUN
 
 Action = NDArray[np.int64]
-Answers = Sequence[tuple[str, str]]
-"""What a language model answered, each with what was wrong with it."""
+Answers = Sequence[tuple[str, str, str | None]]
+"""What language models answered, each with what was wrong with it, and the seat of the model where several play."""
 _AGENT: Final = "agent"
 _SHOWN: Final = 400
 """The most characters of an answer that are shown; a model's last words hold its action."""
@@ -297,8 +297,8 @@ Counts = tuple[int, int, int, int, int]
 
 def _replies(answers: Answers) -> list[Reply]:
     return [
-        Reply(text=text if len(text) <= _SHOWN else f"… {text[-_SHOWN:]}", error=error)
-        for text, error in answers
+        Reply(text=text if len(text) <= _SHOWN else f"… {text[-_SHOWN:]}", error=error, seat=seat)
+        for text, error, seat in answers
     ]
 
 

@@ -353,7 +353,7 @@ export class Mind {
   }
 }
 
-/** What a language model answered in a step. */
+/** What language models answered in a step, and on which seat, where several play. */
 export class Replies {
   constructor() {
     this.list = make("ul", {});
@@ -363,8 +363,8 @@ export class Replies {
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
     this.root.hidden = !episode.scenes.some((scene) => scene.moment.replies);
-    const items = (episode.scenes[step].moment.replies ?? []).map(({ text, error }) =>
-      make("li", {}, text || "(nothing)", error ? make("small", { class: "verdict bad" }, `✗ ${error}`) : null));
+    const items = (episode.scenes[step].moment.replies ?? []).map(({ text, error, seat }) =>
+      make("li", {}, seat ? make("strong", {}, `${seat}: `) : null, text || "(nothing)", error ? make("small", { class: "verdict bad" }, `✗ ${error}`) : null));
     this.list.replaceChildren(...(items.length ? items : [make("li", { class: "quiet" }, "Before the first step.")]));
   }
 }

@@ -50,7 +50,7 @@
  * @property {number[]} [fired]
  * @property {[number, number][]} [others]
  * @property {Thought | null} [thought]
- * @property {{text: string, error?: string}[]} [replies]
+ * @property {{text: string, error?: string, seat?: string | null}[]} [replies]
  * @property {Outcome | null} [ended]
  */
 /**

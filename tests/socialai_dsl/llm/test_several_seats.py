@@ -235,7 +235,7 @@ def test_what_a_model_plays_on_another_seat_is_kept_and_goes_on(partner: str, tm
     for number, trace in enumerate(traces):
         assert (trace.own, trace.agent, trace.players) == ("jill", "llm:stub", {"agent": partner})
         assert len(trace.moments) - 1 == found.result.lengths[number]
-        assert trace.moments[1].replies, "the trace has what the model answered"
+        assert [reply.seat for reply in trace.moments[1].replies] == [None], "what the model answered"
 
 
 def test_models_play_with_models_and_hear_each_other(tmp_path: Path) -> None:
@@ -263,6 +263,11 @@ def test_models_play_with_models_and_hear_each_other(tmp_path: Path) -> None:
     assert figures["models"]["jill"]["replies"] == figures["replies"] == count // 2
     (trace,) = sd.replay(tmp_path / "help_together", test_episodes=[1])
     assert len(trace.moments) - 1 == found.result.lengths[1]
+    for moment, *records in zip(
+        trace.moments[1:], transcript(kept, 1), transcript(kept / "jill", 1), strict=True
+    ):
+        answers = [(reply.seat, reply.text) for reply in moment.replies]
+        assert answers == [(seat, one["reply"]) for seat, one in zip(("agent", "jill"), records, strict=True)]
 
 
 def test_a_model_may_be_the_partner_of_who_is_none(tmp_path: Path) -> None:
@@ -278,6 +283,7 @@ def test_a_model_may_be_the_partner_of_who_is_none(tmp_path: Path) -> None:
         assert one[0].tolist() == other[0].tolist(), "chance draws what it draws beside others"
     (trace,) = sd.replay(tmp_path / "help_together", test_episodes=[1])
     assert (trace.agent, trace.players) == ("random", {"jill": "llm:other"})
+    assert [reply.seat for reply in trace.moments[1].replies] == ["jill"]
     assert len(trace.moments) - 1 == found.result.lengths[1]
 
 
