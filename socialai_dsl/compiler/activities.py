@@ -32,7 +32,8 @@ def has_aim(activity: Activity) -> bool:
     word = ACTIVITIES[activity.name]
     if word.act is not None:
         return True
-    return (word.goes is not None or activity.name == "turn_to") and not isinstance(activity.args[0], Const)
+    ends = word.goes is not None or activity.name == "turn_to" or activity.until is not None
+    return ends and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -63,18 +64,22 @@ class Activities:
         """
         to, block = self.to, self.to.block
         to.site, block.span = activity.site, activity.span
-        nothing, done = Label(), Label()
+        nothing, absent, done = Label(), Label(), Label()
         to.failed = nothing
+        if activity.until is not None and self.aim is not None:
+            self._aimed_at(activity)
+            to.failed = absent  # what is found and not in the room is an aim all the same
         if acting:
             self._emit(activity)
-        else:
+        elif activity.until is None:
             self._note_aim(activity)
         to.failed = None
-        if nothing.uses:
+        if nothing.uses or absent.uses:
             block.skip(done)
             block.bind(nothing)
-            if self.aim is not None:
+            if self.aim is not None and nothing.uses:
                 block.emit(Op.LOAD, self.aim, constant(NOTHING))
+            block.bind(absent)
             if acting:
                 block.emit(Op.BODY, constant(Body.NONE))
             block.bind(done)
@@ -380,6 +385,8 @@ class Activities:
         to, block, word = self.to, self.to.block, ACTIVITIES[activity.name]
         if activity.until is not None:
             with block.scratch():
+                if self.aim is not None:
+                    block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
                 to.sited_condition(SitedTerm(activity.until, activity.site, activity.span), otherwise)
             return
         if not (word.lapses or word.act or activity.name in ("turn_to", "perform")):

@@ -446,8 +446,14 @@ def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name,
         return
     name = node.id if isinstance(node, ast.Name) else node.name
     hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
-    if name in OF_PLAYERS and isinstance(subject, ast.Name) and subject.id in resolver.symbols.scenario.cast:
-        hint = f"or give `{subject.id}` a seat: `seat: open`"
+    called = subject.id if isinstance(subject, ast.Name) else None
+    if called is not None and called in resolver.symbols.scenario.cast:
+        if name in OF_PLAYERS:
+            hint = f"or give `{called}` a seat: `seat: open`"
+        elif name == "noun" and resolver.symbols.cast[called].value("seat") is not None:
+            templates = resolver.symbols.scenario.grammar.templates
+            text = next((one for one in templates if "<noun>" in one), "<noun>").replace("<noun>", "<n>")
+            hint = f'of `{called}` it is `first(n in nouns where {called}.said("{text}"))`'
     raise resolver.fail(
         "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
     )
