@@ -435,8 +435,7 @@ async def play_async(
                 return
             leaving = True
             try:
-                actions = {seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items()}
-                ended = rooms.step(actions).ended
+                ended = rooms.step(await _all_asked(rooms, players, wait)).ended
             except EpisodeOver:
                 rooms.cut()
                 ended = np.ones(1, np.bool_)
@@ -470,6 +469,35 @@ def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: 
     if forgetting.any():
         for policy in players.values():
             policy.reset(forgetting.copy(), numbers.copy())
+
+
+async def _all_asked(rooms: Rooms, players: Mapping[Seat, Policy], wait: float | None) -> dict[Seat, Int64]:
+    """The actions of all seats. Those who answer later are asked at once, and all of them are waited for."""
+    later = [seat for seat, policy in players.items() if inspect.iscoroutinefunction(policy.act)]
+    if len(later) < 2 or not _is_in_a_loop():
+        return {seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items()}
+    found = {
+        seat: await _asked(rooms, seat, policy, wait) for seat, policy in players.items() if seat not in later
+    }
+    asked = [_asked(rooms, seat, players[seat], wait) for seat in later]
+    raised: list[BaseException] = []
+    for seat, answer in zip(later, await asyncio.gather(*asked, return_exceptions=True), strict=True):
+        if isinstance(answer, BaseException):
+            raised.append(answer)
+        else:
+            found[seat] = answer
+    if raised:
+        raise next((one for one in raised if not isinstance(one, PolicyDone | EpisodeOver)), raised[0])
+    return found
+
+
+def _is_in_a_loop() -> bool:
+    """Whether an event loop runs here."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
 
 
 async def _asked(rooms: Rooms, seat: Seat, policy: Policy, wait: float | None) -> Int64:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import re
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -268,6 +269,19 @@ def test_models_play_with_models_and_hear_each_other(tmp_path: Path) -> None:
     ):
         answers = [(reply.seat, reply.text) for reply in moment.replies]
         assert answers == [(seat, one["reply"]) for seat, one in zip(("agent", "jill"), records, strict=True)]
+
+
+def test_all_models_of_a_room_are_asked_at_once(tmp_path: Path) -> None:
+    both = threading.Barrier(2, timeout=20)
+
+    def respond(request: dict[str, Any]) -> str:
+        both.wait()
+        return "Act: done"
+
+    with endpoint(respond) as stub:
+        options = {"out": tmp_path, "seats": {"jill": "llm:other"}, "concurrency": 1, **asked(stub)}
+        found = sd.evaluate("llm:stub", HELP, 1, **options)
+    assert found.figures()["replies"] == found.figures()["models"]["jill"]["replies"] == 1
 
 
 def test_a_model_may_be_the_partner_of_who_is_none(tmp_path: Path) -> None:
