@@ -63,6 +63,7 @@ __all__ = [
     "load",
     "load_curriculum",
     "load_experiment",
+    "variant_of",
 ]
 
 UNUSED: Final = "W008"
@@ -376,7 +377,7 @@ def closest_script(
     plain = Scripted(name, loaded or load(name, texts))
     if not unscripted(plain.loaded):
         return plain
-    oracle = _oracle_of(name)
+    oracle = variant_of(name, "oracle")
     try:
         return Scripted(oracle, load(oracle, texts))
     except ScenarioError as error:
@@ -415,9 +416,10 @@ def rival_of(loaded: LoadedScenario, rival: str) -> LoadedScenario:
     return LoadedScenario(f"{loaded.name}+{rival}", checked, scenario, resolved)
 
 
-def _oracle_of(name: str) -> str:
+def variant_of(name: str, variant: str) -> str:
+    """How the variant of a scenario is called, whose parameters stay."""
     base, mark, parameters = name.partition("?")
-    return f"{base}+oracle{mark}{parameters}"
+    return f"{base}+{variant}{mark}{parameters}"
 
 
 def _is_not_there(error: ScenarioError) -> bool:
@@ -433,7 +435,7 @@ def _check_claimed_script(
     if not claims or any(frame.entity == 0 for frame in checked.frames):
         return
     try:
-        resolve(_oracle_of(name), texts=texts)
+        resolve(variant_of(name, "oracle"), texts=texts)
     except ScenarioError as error:
         for plan in claims if _is_not_there(error) else ():
             hint = "give it a variant `oracle` in which the agent follows a frame"

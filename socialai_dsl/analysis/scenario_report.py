@@ -12,7 +12,7 @@ from socialai_dsl.analysis.effort import why_no_more
 from socialai_dsl.analysis.properties import RIVAL_ROOMS
 from socialai_dsl.analysis.reports import Report, rooms_text
 from socialai_dsl.diagnostics import Diagnostic, Severity
-from socialai_dsl.frontend import not_ignored
+from socialai_dsl.frontend import not_ignored, variant_of
 from socialai_dsl.semantics.plans import PropertyPlan
 from socialai_dsl.semantics.typed import trace_command
 from socialai_dsl.source import Source, Span
@@ -122,8 +122,7 @@ class ScenarioReport:
 
     def _command(self, plan: PropertyPlan, report: Report) -> str:
         """What shows the first room that speaks against a claim; with the script, or the rival, if it is about one."""
-        base, mark, parameters = self.scenario.partition("?")
-        name = f"{base}+{plan.rival}{mark}{parameters}" if plan.rival else self.scenario
+        name = variant_of(self.scenario, plan.rival) if plan.rival else self.scenario
         room = ["--seed", str(self.seed), "--index", str(report.against[0])]
         return trace_command(name, room, report.acts)
 

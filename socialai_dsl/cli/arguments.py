@@ -84,18 +84,19 @@ def add_seats(
     parser: argparse.ArgumentParser,
     more: str = "; the one who plays has the first seat that is left",
     models: bool = False,
+    rivals: bool = True,
 ) -> None:
-    """Declare who sits on other seats than the one who plays; `models`: also language models."""
-    trained = (
-        "a run, a checkpoint, shipped:NAME or llm:MODEL" if models else "a run, a checkpoint or shipped:NAME"
-    )
+    """Declare who sits on other seats than the one who plays; `models`: also language models; `rivals`: also them."""
+    players = ["script", "random", "nobody", "a run", "a checkpoint", "shipped:NAME"]
+    players += ["llm:MODEL"] * models + ["rival:NAME on the agent's seat"] * rivals
     parser.add_argument(
         "--seat",
         action="append",
         type=seat_and_player,
         default=[],
         metavar="NAME=PLAYER",
-        help=f"who plays a member of the cast with a seat: script, random, nobody, {trained} (repeatable){more}",
+        help=f"who plays a member of the cast with a seat: {', '.join(players[:-1])} or {players[-1]} "
+        f"(repeatable){more}",
     )
 
 

@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "players",
         nargs="+",
         metavar="PLAYER",
-        help="the folder of a run, a checkpoint, shipped:NAME, random, oracle (each seat's own script), or llm:MODEL",
+        help="the folder of a run, a checkpoint, shipped:NAME, random, oracle (each seat's own script), llm:MODEL, or "
+        "rival:NAME, which plays the agent alone",
     )
     parser.add_argument(
         "--on", required=True, metavar="SCENARIO", help="the scenario to play, with several seats"
@@ -65,23 +66,15 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _matrix(found: CrossPlay, seat: str) -> list[str]:
     """The success of a seat as lines; columns have numbers where names would take too much room."""
-    width = max(5, *map(len, found.names)) + 2
-    heads = list(found.names)
-    if width * (len(heads) + 1) > _WIDTH:
+    names = heads = list(found.names)
+    if (max(5, *map(len, names)) + 2) * (len(found.others) + 1) > _WIDTH:
         heads = [str(number) for number in range(1, len(heads) + 1)]
-    names = [
-        name if name == head else f"{head} {name}" for head, name in zip(heads, found.names, strict=True)
-    ]
-    cells = [
-        ["", *heads],
-        *(
-            [name, *(f"{found.rate((one, other), seat).success:.2f}" for other in range(len(names)))]
-            for one, name in enumerate(names)
-        ),
-    ]
-    lines = columns(cells)
-    others = found.with_others(seat)
-    told = f"with themselves {found.with_themselves(seat)}" + (
-        "" if others is None else f", with others {others}"
-    )
-    return [*lines, f"{told} (95% intervals over rooms)"]
+        names = [f"{head} {name}" for head, name in zip(heads, names, strict=True)]
+    cells = [["", *(heads[other] for other in found.others)]]
+    for one in found.agents:
+        pairs = [(one, other) for other in found.others]
+        rates = [f"{found.rate(pair, seat).success:.2f}" if pair in found.results else "" for pair in pairs]
+        cells.append([names[one], *rates])
+    means = {"with themselves": found.with_themselves(seat), "with others": found.with_others(seat)}
+    told = ", ".join(f"{name} {mean}" for name, mean in means.items() if mean is not None)
+    return [*columns(cells), f"{told} (95% intervals over rooms)"]

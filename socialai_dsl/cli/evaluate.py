@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "run",
         metavar="RUN_DIR",
         help="the agent: the folder of a run, a checkpoint, shipped:NAME, shipped (the agent of each scenario), "
-        "random, oracle or llm:MODEL",
+        "random, oracle, rival:NAME or llm:MODEL",
     )
     parser.add_argument(
         "--on",

@@ -37,6 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_seats(
         parser,
         "; several for one seat take turns from game to game; the agent learns on all seats that are left",
+        rivals=False,
     )
     parser.add_argument(
         "--hyper",

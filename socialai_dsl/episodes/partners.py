@@ -20,7 +20,7 @@ from socialai_dsl.envs.seats import CALLER, NOBODY, RANDOM, SCRIPT
 from socialai_dsl.episodes.play import AGENT, Rooms, Seat, Step
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, require_trainer
 from socialai_dsl.episodes.policies import Int64, Observation, Policy, ReplayedPolicy
-from socialai_dsl.episodes.scripts import with_script
+from socialai_dsl.episodes.scripts import with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable, has_script, seats_of
@@ -38,7 +38,7 @@ _WORDS = {SCRIPT: "oracle", NOBODY: NOBODY}
 
 Named = Sequence[tuple[Seat, str | Player]]
 """Pairs of a seat and who has it: a `Player`, `script`, `random`, `nobody`, the path of a trained agent,
-`shipped:NAME` or `llm:MODEL`."""
+`shipped:NAME` or `llm:MODEL`; on the agent's seat also `rival:NAME`."""
 
 
 def partners_of(named: Named, scenario: str, program: Playable) -> dict[Seat, Player]:
@@ -68,10 +68,24 @@ def pools_of(named: Named, scenario: str, program: Playable) -> dict[Seat, list[
             near = suggested(seat, seats, quoted=repr)
             raise OptionError(_SEAT, f"got {seat!r}, expected one of {', '.join(seats)}{near}")
         for one in [name] if isinstance(name, Player) else _matches(name):
-            found.setdefault(seat, []).append(_meant(one, scenario))
+            player = _meant(one, scenario)
+            require_seat(player, seat)
+            found.setdefault(seat, []).append(player)
     if len(found) == len(seats):
         raise OptionError(_SEAT, f"got a player for {', '.join(seats)}, expected one seat left for who plays")
     return found
+
+
+def require_seat(player: Player, seat: Seat) -> None:
+    """See that a player can have a seat.
+
+    Raises:
+        UsageError: it is a rival, and the seat is not the agent's.
+    """
+    if player.rival is not None and seat != AGENT:
+        raise OptionError(
+            _SEAT, f"got {player.agent!r} for {seat}, but a rival is a frame for the seat {AGENT!r} alone"
+        )
 
 
 def called(player: Player) -> str:
@@ -134,15 +148,16 @@ def seating(
         texts: those that it is loaded with, see `check`.
 
     Returns:
-        The scenario, or its variant `oracle` where a script plays the agent; None where nobody was named.
+        The scenario, or that with a frame for the agent where a script or a rival plays it; None where nobody was
+        named.
 
     Raises:
         UsageError: a partner has no script, does not fit, or is none that can be asked here.
     """
     if not partners:
         return loaded, None
-    if AGENT in partners and partners[AGENT].is_script:
-        loaded = with_script(scenario, loaded, texts).loaded
+    if AGENT in partners and partners[AGENT].follows_frame:
+        loaded = with_frame_of(partners[AGENT], scenario, loaded, texts).loaded
     return loaded, _filled(partners, compiled(loaded))
 
 
@@ -151,7 +166,7 @@ class Beside:
     """What one plays who plays alone beside partners, in any number of environments.
 
     Attributes:
-        loaded: the scenario, or its variant `oracle` where a script plays the agent.
+        loaded: the scenario, or that with a frame for the agent where a script or a rival plays it.
         program: the same, compiled.
         partners: of other seats; the rest follow their scripts.
     """
@@ -200,7 +215,7 @@ def _filled(partners: Partners, program: Playable) -> dict[Seat, str | Policy]:
 
 
 def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | Policy:
-    if player.is_script:
+    if player.follows_frame:
         if not has_script(program, seat):
             raise OptionError(_SEAT, f"got 'script' for {seat}, which follows no frame, so it has no script")
         return SCRIPT
@@ -208,7 +223,8 @@ def _filling(player: Player, seat: Seat, program: Playable, env: Any) -> str | P
         return player.agent
     if player.is_model or player.is_person:
         raise OptionError(
-            _SEAT, f"got {player.agent!r} for {seat}, expected script, random, nobody or a trained agent"
+            _SEAT,
+            f"got {player.agent!r} for {seat}, expected script, random, nobody or a trained agent",
         )
     if player.is_trained:
         require_trainer()
@@ -256,11 +272,14 @@ def company(
         UsageError: a player does not fit the scenario, now or in the block.
     """
     for seat, player in players.items():
+        require_seat(player, seat)
         if player.is_person:
             raise OptionError(_SEAT, f"got 'human' for {seat}, expected a player who needs no terminal")
         if player.is_trained:
             require_trainer()
-    played = compiled(with_script(scenario, loaded).loaded) if players[AGENT].is_script else program
+    played = program
+    if players[AGENT].follows_frame:
+        played = compiled(with_frame_of(players[AGENT], scenario, loaded).loaded)
     seats = seats_of(program)
     scripts = tuple(seat for seat in seats if seat != AGENT and players[seat].is_script)
     envs = make_vec(
@@ -277,8 +296,8 @@ def company(
         for number, seat in enumerate(seats):
             if seat in scripts or players[seat].is_model:
                 continue
-            if players[seat].is_script:
-                policies[seat] = AgentsScript(envs)
+            if players[seat].follows_frame:
+                policies[seat] = FrameOfAgent(envs)
                 continue
             policies[seat], warnings = _seated(players[seat], number, plain)
             told += [warning for warning in warnings if warning not in told]
@@ -290,8 +309,8 @@ def company(
         plain.close()
 
 
-class AgentsScript:
-    """The script of the agent in rooms of which all seats are played."""
+class FrameOfAgent:
+    """The frame of the agent, its script or a rival, in rooms of which all seats are played."""
 
     def __init__(self, envs: Any) -> None:
         self._envs = envs

@@ -1,4 +1,4 @@
-"""Players: random actions, a script, a person, a language model or a trained network."""
+"""Players: random actions, a script, a rival, a person, a language model or a trained network."""
 
 import re
 import secrets
@@ -31,6 +31,7 @@ from trainer.config import LEARNS, UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
 
 MODEL_PREFIX: Final = "llm:"
+RIVAL_PREFIX: Final = "rival:"
 HUMAN_FOLDER: Final = Path("runs", "human")
 """Where the sessions of people go unless the user says otherwise."""
 
@@ -40,8 +41,8 @@ class Player:
     """Who plays, and how.
 
     Attributes:
-        agent: `random`, `oracle`, `nobody`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
-            checkpoints or of one; of a policy of one's own what it is called.
+        agent: `random`, `oracle`, `rival:NAME`, `nobody`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, a
+            folder of checkpoints or one of them; of a policy of one's own what it is called.
         device: where a network runs.
         greedy: whether a network takes its most probable action instead of sampling.
         seed: of what a network or `random` draws; rooms do not depend on it.
@@ -98,11 +99,13 @@ class Player:
 
     @property
     def kind(self) -> str:
-        """What kind of mind plays: chance, script, nobody, person, model, network, or a policy in Python."""
+        """What kind of mind plays: chance, script, rival, nobody, person, model, network, or a policy in Python."""
         if self.policy is not None:
             return "policy"
         if self.is_model:
             return "model"
+        if self.rival is not None:
+            return "rival"
         return {"random": "chance", "oracle": "script", "human": "person", NOBODY: NOBODY}.get(
             self.agent, "network"
         )
@@ -113,9 +116,20 @@ class Player:
         return self.policy is None and self.agent == "oracle"
 
     @property
+    def rival(self) -> str | None:
+        """The rival of the scenario that plays, by its name there; None if somebody else does."""
+        named = self.policy is None and self.agent.startswith(RIVAL_PREFIX)
+        return self.agent.removeprefix(RIVAL_PREFIX) if named else None
+
+    @property
+    def follows_frame(self) -> bool:
+        """Whether the one who plays the agent follows a frame of the scenario's file: its script, or a rival."""
+        return self.is_script or self.rival is not None
+
+    @property
     def is_trained(self) -> bool:
         """Whether a network plays whose checkpoint `agent` names."""
-        return self.policy is None and self.agent not in (*UNTRAINED, NOBODY) and not self.is_model
+        return self.kind == "network"
 
     def briefing(self, loaded: Loaded) -> Briefing:
         """What is told of a scenario or suite before the first observation.
@@ -139,7 +153,7 @@ class Player:
         """How actions come about, in a phrase; empty where there is nothing to say."""
         if self.options is not None:
             return self.options.manner
-        if self.agent in ("oracle", "human") or self.policy is not None:
+        if self.kind in ("script", "rival", "person", "policy"):
             return ""
         return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
 
@@ -166,7 +180,7 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
         return RandomPolicy(Rooms(envs).action_sizes, player.seed), []
     if player.agent == NOBODY:
         return StillPolicy(Rooms(envs).action_sizes), []
-    if player.agent == "oracle":
+    if player.follows_frame:
         return ScriptedPolicy(envs), []
     from trainer.play import CheckpointPolicy
 
@@ -270,7 +284,7 @@ def played_again(agent: str) -> str:
         UsageError: a person or a language model played there, or an agent that is not here.
         OSError: what the folder says cannot be read.
     """
-    if agent in UNTRAINED or agent.startswith(MODEL_PREFIX):
+    if agent in UNTRAINED or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)):
         return agent
     folder = folder_of(agent)
     if not (folder / CONFIG).is_file() or (played := agent_of(folder)) == LEARNS:

@@ -18,12 +18,20 @@ from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import compiled, make_loaded
 from socialai_dsl.envs.options import reset_arguments
 from socialai_dsl.envs.seats import SCRIPT
-from socialai_dsl.episodes.partners import acts_of_others, by_seat, own_seat, partners_of, seating, sitting
+from socialai_dsl.episodes.partners import (
+    acts_of_others,
+    by_seat,
+    own_seat,
+    partners_of,
+    require_seat,
+    seating,
+    sitting,
+)
 from socialai_dsl.episodes.play import AGENT, Observer, OneEpisode, Rooms, Seat, Step, play
 from socialai_dsl.episodes.players import Agent, Player, make_policy, player_of, require_trainer
 from socialai_dsl.episodes.policies import Observation, Policy, ReplayedPolicy
 from socialai_dsl.episodes.results import Actions
-from socialai_dsl.episodes.scripts import script_of, with_script
+from socialai_dsl.episodes.scripts import script_of, with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import has_script, seats_of
@@ -239,8 +247,9 @@ class TracedEpisode:
             player.is_script and own != AGENT
         ):  # it plays by itself, beside the one who was named for the agent
             player, own = partners.pop(AGENT), AGENT
-        if player.is_script:
-            scenario = with_script(scenario).name
+        require_seat(player, own)
+        if player.follows_frame:
+            scenario = with_frame_of(player, scenario).name
         loaded, filled = seating(partners, scenario, load(scenario))
         # Of several seats all are traced, also where scripts play by themselves.
         self._seats = filled or ({} if len(seats_of(program)) > 1 else None)

@@ -18,10 +18,9 @@ from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, played_again, require_trainer
-from socialai_dsl.episodes.scripts import script_of, with_script
+from socialai_dsl.episodes.scripts import script_of, with_frame_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
-from trainer.config import UNTRAINED
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")
@@ -69,10 +68,11 @@ def coverage(
 def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Which agents play, and under which name each finds the scenario."""
     for agent in agents or ("random", "oracle"):
-        if played_again(agent) != "oracle":
+        player = Player(played_again(agent))
+        if not player.follows_frame:
             yield agent, scenario
         elif agents:
-            yield agent, with_script(scenario).name
+            yield agent, with_frame_of(player, scenario).name
         elif (scripted := script_of(scenario)) is not None:
             yield agent, scripted.name
 
@@ -86,9 +86,10 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
     """Let an agent play. What happens in episodes that the clock breaks off counts."""
     envs: Any = make_vec(scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled")
     try:
-        if agent not in UNTRAINED:
+        player = Player(named_agent(agent, scenario), seed=seed)
+        if player.is_trained:
             require_trainer()
-        policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
+        policy, told = make_policy(player, envs)
         for warning in told:
             warnings.warn(warning, stacklevel=2)
         counting = Counting(Watch(envs, scenarios_of(load(scenario))))

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.players import MODEL_PREFIX, Player
+from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX, Player
 from socialai_dsl.episodes.results import EvalResult, interval_over_rooms
+from socialai_dsl.episodes.scripts import with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.program_suite import seats_of
@@ -28,7 +30,8 @@ class CrossPlay:
 
     Attributes:
         scenario: what was played. seats: its seats, the agent's first. names: of the players.
-        results: by (who plays the agent, who plays the others), as indices into `names`.
+        results: by (who plays the agent, who plays the others), as indices into `names`; pairs that cannot play
+            together are left out.
     """
 
     scenario: str
@@ -36,17 +39,29 @@ class CrossPlay:
     names: tuple[str, ...]
     results: Mapping[tuple[int, int], EvalResult]
 
+    @property
+    def agents(self) -> list[int]:
+        """Who has played the agent, as indices into `names`."""
+        return sorted({one for one, _ in self.results})
+
+    @property
+    def others(self) -> list[int]:
+        """Who has played the others, as indices into `names`."""
+        return sorted({other for _, other in self.results})
+
     def rate(self, pair: tuple[int, int], seat: str) -> Rate:
         """The share of a pair's episodes that were a success of a seat."""
         return _rate(self._won([pair], seat))
 
-    def with_themselves(self, seat: str) -> Rate:
-        """Mean success of the players with themselves."""
-        return _rate(self._won([pair for pair in self.results if pair[0] == pair[1]], seat))
+    def with_themselves(self, seat: str) -> Rate | None:
+        """Mean success of the players with themselves; None where nobody plays with itself."""
+        return self._mean([pair for pair in self.results if pair[0] == pair[1]], seat)
 
     def with_others(self, seat: str) -> Rate | None:
-        """Mean success of the players with each other; None where there is one player."""
-        pairs = [pair for pair in self.results if pair[0] != pair[1]]
+        """Mean success of the players with each other; None where nobody plays with another."""
+        return self._mean([pair for pair in self.results if pair[0] != pair[1]], seat)
+
+    def _mean(self, pairs: Sequence[tuple[int, int]], seat: str) -> Rate | None:
         return _rate(self._won(pairs, seat)) if pairs else None
 
     def _won(self, pairs: Sequence[tuple[int, int]], seat: str) -> NDArray[np.bool_]:
@@ -58,14 +73,14 @@ class CrossPlay:
         """The figures as a JSON-able object."""
         found: dict[str, Any] = {
             "scenario": self.scenario,
-            "episodes": self.results[0, 0].episodes,
+            "episodes": next(iter(self.results.values())).episodes,
             "players": list(self.names),
             "seats": {},
         }
         for seat in self.seats:
-            others = self.with_others(seat)
+            alone, others = self.with_themselves(seat), self.with_others(seat)
             found["seats"][seat] = {
-                "with_themselves": self.with_themselves(seat).figures(),
+                "with_themselves": None if alone is None else alone.figures(),
                 "with_others": None if others is None else others.figures(),
                 "cells": [
                     {
@@ -104,7 +119,8 @@ def cross_play(
     """Let everybody play with everybody, and with themselves, on the same test episodes.
 
     Args:
-        players: `random`, `oracle`, which is each seat's own script, trained agents, or language models.
+        players: `random`, `oracle`, which is each seat's own script, trained agents, language models, or rivals, which
+            play the agent alone.
         scenario: as it was asked for.
         loaded: the same.
         episodes: of each pair.
@@ -123,8 +139,16 @@ def cross_play(
         raise UsageError(
             f"{scenario}: only the agent has a seat; `seat: open` gives one to another member of the cast"
         )
+    others = [number for number, player in enumerate(players) if player.rival is None]
+    if not others:
+        raise UsageError(
+            f"{scenario}: got rivals alone, who play {seats[0]}; expected a player for {seats[1]}, too"
+        )
+    for player in players:
+        if player.rival is not None:
+            with_frame_of(player, scenario, loaded)  # so that a slip is told before anybody plays
     names, results = names_of(players), {}
-    for one, other in np.ndindex(len(players), len(players)):
+    for one, other in product(range(len(players)), others):
         place = None if out is None else out / _folder_name(f"{names[one]} with {names[other]}")
         player, partner = (replace(players[number], out=place) for number in (one, other))
         partners = dict.fromkeys(seats[1:], partner)
@@ -156,4 +180,5 @@ def names_of(players: Sequence[Player]) -> list[str]:
 
 
 def _parts(agent: str) -> tuple[str, ...]:
-    return (agent,) if agent.startswith((PREFIX, MODEL_PREFIX)) else Path(agent).parts or (agent,)
+    named = agent.startswith((PREFIX, MODEL_PREFIX, RIVAL_PREFIX))
+    return (agent,) if named else Path(agent).parts or (agent,)

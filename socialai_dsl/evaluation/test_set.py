@@ -274,8 +274,8 @@ def play_test_set(
         program: the same, compiled.
         episodes: how many.
         trials: how many in a row the player remembers.
-        partners: who sits on other seats than the player. On those that are left it plays as well, a person or a
-            language model on the first of them alone.
+        partners: who sits on other seats than the player. On those that are left it plays as well, a person, a
+            language model or a rival on the first of them alone.
         observers: watch as well, where neither a person nor a language model plays.
 
     Raises:
@@ -287,9 +287,9 @@ def play_test_set(
     if player.is_person:
         person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing)
         return _of_person(person, scenario, loaded, program, player, own, partners, briefing)
+    if player.is_model or player.rival is not None:  # which play on one seat alone
+        partners = _with_idle(partners, own, program)
     if models := [one for one in (player, *partners.values()) if one.is_model]:
-        if player.is_model:  # which plays on one seat alone
-            partners = _with_idle(partners, own, program)
         players = {seat: partners.get(seat, player) for seat in seats_of(program)}
         place = models[0].kept_in
         played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials)

@@ -148,11 +148,9 @@ def words_of(player: Player, partners: Partners, scenario: str, loaded: Loaded, 
     assert isinstance(program, Program), "internal: it is no suite"
     listening, own = _Listening(loaded, program, episodes), own_seat(partners, program)
     watched = [listening]
-    result = play_test_set(
-        player, scenario, loaded, program, episodes, partners=partners, observers=watched
-    ).result
-    called = {seat: _called(partners.get(seat, player)) for seat in seats_of(program)}
-    return _found(scenario, listening, result, own, called)
+    played = play_test_set(player, scenario, loaded, program, episodes, partners=partners, observers=watched)
+    called = {seat: _called(played.partners.get(seat, player)) for seat in seats_of(program)}
+    return _found(scenario, listening, played.result, own, called)
 
 
 def _called(player: Player) -> str:

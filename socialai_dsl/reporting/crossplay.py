@@ -56,8 +56,8 @@ def matrix_size(found: CrossPlayRecord) -> tuple[float, float]:
     wide, high = _cell(found)
     longest = max(len(_label(name)) for name in found.players)
     above = 0.6 if _numbered(found) else 0.5 + (longest * 0.055 if longest > _SHORT else 0.0)
-    count = len(found.players)
-    return max(4.2, count * wide + 0.9 + longest * 0.075), count * high + above + 1.3
+    rows, columns = len(found.agents), len(found.others)
+    return max(4.2, columns * wide + 0.9 + longest * 0.075), rows * high + above + 1.3
 
 
 def _cell(found: CrossPlayRecord) -> tuple[float, float]:
@@ -66,50 +66,52 @@ def _cell(found: CrossPlayRecord) -> tuple[float, float]:
 
 def _numbered(found: CrossPlayRecord) -> bool:
     """Whether columns have numbers for names."""
-    return len(found.players) > _FEW
+    return len(found.others) > _FEW
 
 
 def _draw(figure: Figure | SubFigure, found: CrossPlayRecord, seats: Sequence[str]) -> None:
-    cells = len(found.players) * _cell(found)[1]
+    cells = len(found.agents) * _cell(found)[1]
     matrix, means = figure.subplots(2, 1, height_ratios=(cells, 0.55))
     _matrix(matrix, found, seats)
     _means(means, found.seats[seats[0]], found.episodes)
 
 
 def _matrix(axes: Axes, found: CrossPlayRecord, seats: Sequence[str]) -> None:
-    """Rows: who plays the agent. Columns: who plays the others. Outlined: a player with itself."""
-    players, first = found.players, next(iter(found.seats))
+    """Rows: who plays the agent. Columns: who plays the others. Outlined: a player with itself. Pairs that did not
+    play are empty.
+    """
+    rows, columns, first = found.agents, found.others, next(iter(found.seats))
     rates = {(cell.agent, cell.others): cell for cell in found.seats[seats[0]].cells}
-    success = np.array([[rates[one, other].success for other in players] for one in players])
+    success = np.full((len(rows), len(columns)), np.nan)
+    for one, other in rates:
+        success[rows.index(one), columns.index(other)] = rates[one, other].success
     axes.pcolormesh(success, cmap=_RAMP, vmin=0, vmax=1, edgecolor="white", linewidth=1.5)
     large = 8.5 if _numbered(found) else 10.0
-    for (row, column), rate in np.ndenumerate(success):
-        low, high = rates[players[row], players[column]].interval
+    for row, column in zip(*(~np.isnan(success)).nonzero(), strict=True):
+        rate = success[row, column]
+        low, high = rates[rows[row], columns[column]].interval
         ink = "white" if rate > _DARK else INK
         centre: dict[str, Any] = {"ha": "center", "color": ink}
         axes.text(
             column + 0.5, row + 0.46, f"{rate:.2f}", va="bottom", fontsize=large, fontweight="bold", **centre
         )
         axes.text(column + 0.5, row + 0.58, f"{low:.2f}–{high:.2f}", va="top", fontsize=large - 3.0, **centre)
-    for place in range(len(players)):
-        axes.add_patch(
-            Rectangle(
-                (place + 0.03, place + 0.04), 0.94, 0.92, fill=False, edgecolor=COLOURS[1], linewidth=1.8
-            )
-        )
+    for one in (one for one, other in rates if one == other):
+        corner = columns.index(one) + 0.03, rows.index(one) + 0.04
+        axes.add_patch(Rectangle(corner, 0.94, 0.92, fill=False, edgecolor=COLOURS[1], linewidth=1.8))
     axes.invert_yaxis()
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0, labelcolor=INK, labelsize=8.5)
-    names = heads = [_label(name) for name in players]
+    names, heads = {name: _label(name) for name in found.players}, [_label(name) for name in columns]
     if _numbered(found):
-        heads = [str(number) for number in range(1, len(players) + 1)]
-        names = [f"{name}  {number}" for number, name in zip(heads, names, strict=True)]
-    places = np.arange(len(players)) + 0.5
-    axes.set_yticks(places, names)
+        numbers = {name: str(number) for number, name in enumerate(found.players, start=1)}
+        names = {name: f"{label}  {numbers[name]}" for name, label in names.items()}
+        heads = [numbers[name] for name in columns]
+    axes.set_yticks(np.arange(len(rows)) + 0.5, [names[name] for name in rows])
     slanted = max(map(len, heads)) > _SHORT
     axes.set_xticks(
-        places,
+        np.arange(len(columns)) + 0.5,
         heads,
         rotation=40 if slanted else 0,
         ha="left" if slanted else "center",

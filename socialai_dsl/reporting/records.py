@@ -150,9 +150,11 @@ class Cell(Rate):
 
 
 class SeatRecord(Record):
-    """The success of a seat: means over the players with themselves and with each other, and that of each pair."""
+    """The success of a seat: means over the players with themselves and with each other, and that of each pair that
+    played.
+    """
 
-    with_themselves: Rate
+    with_themselves: Rate | None
     with_others: Rate | None
     cells: list[Cell] = Field(min_length=1)
 
@@ -171,12 +173,29 @@ class CrossPlayRecord(Record):
     seats: dict[str, SeatRecord] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _every_pair_is_there(self) -> Self:
-        pairs = sorted((one, other) for one in self.players for other in self.players)
+    def _pairs_are_of_players(self) -> Self:
+        played = [(cell.agent, cell.others) for cell in next(iter(self.seats.values())).cells]
+        if len(set(played)) < len(played) or {name for pair in played for name in pair} != set(self.players):
+            raise ValueError("expected cells of each of the players, one for a pair")
         for seat, found in self.seats.items():
-            if sorted((cell.agent, cell.others) for cell in found.cells) != pairs:
-                raise ValueError(f"expected a cell of {seat} for each pair of players")
+            if [(cell.agent, cell.others) for cell in found.cells] != played:
+                raise ValueError(f"expected a cell of {seat} for each pair that played")
         return self
+
+    @property
+    def agents(self) -> list[str]:
+        """Who has played the agent: the rows of a matrix."""
+        return self._on(0)
+
+    @property
+    def others(self) -> list[str]:
+        """Who has played the others: the columns of a matrix."""
+        return self._on(1)
+
+    def _on(self, side: int) -> list[str]:
+        cells = next(iter(self.seats.values())).cells
+        played = {(cell.agent, cell.others)[side] for cell in cells}
+        return [name for name in self.players if name in played]
 
     @property
     def alike(self) -> list[tuple[str, ...]]:

@@ -11,7 +11,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
 from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
-from socialai_dsl.episodes.players import MODEL_PREFIX
+from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
@@ -94,7 +94,7 @@ def keep_partners(folder: Path, seats: Mapping[str, Sequence[str]]) -> dict[str,
     """
 
     def kept(seat: str, place: int, name: str) -> str:
-        if name in (SCRIPT, RANDOM, NOBODY) or name.startswith((PREFIX, MODEL_PREFIX)):
+        if name in (SCRIPT, RANDOM, NOBODY) or name.startswith((PREFIX, MODEL_PREFIX, RIVAL_PREFIX)):
             return name
         from trainer import checkpoint as checkpoints
         from trainer.errors import CheckpointError

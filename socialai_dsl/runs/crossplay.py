@@ -30,7 +30,8 @@ def crossplay(
     """Let everybody play with everybody, and with themselves, as `socialai crossplay` does.
 
     Args:
-        agents: `random`, `oracle` (each seat's own script), runs, checkpoints and `llm:MODEL`; see `evaluate`.
+        agents: `random`, `oracle` (each seat's own script), runs, checkpoints, `llm:MODEL`, and `rival:NAME`, which
+            plays the agent alone; see `evaluate`.
         scenario: a path or a name, with several seats.
         episodes: of each pair.
         out: a folder that gets the figures as `crossplay.json`, and a picture of them as PNG and SVG; reports take it.
@@ -52,7 +53,7 @@ def crossplay(
     ]
     if any(player.is_person for player in players):
         raise UsageError(
-            "crossplay: got a person; expected random, oracle, a run, a checkpoint or a language model"
+            "crossplay: got a person; expected random, oracle, a rival, a run, a checkpoint or a language model"
         )
     if any(player.is_trained for player in players):
         require_trainer()

@@ -54,6 +54,7 @@ _TOLD: Final = ("tell", "goal", "language")
 _OF_KINDS: Final[dict[str, tuple[str, ...]]] = {
     "network": _PLAYER,
     "script": (),
+    "rival": (),
     "chance": ("seed",),
     "model": (*_MODEL, *_TOLD),
     "person": ("view", "participant", *_TOLD),
@@ -76,9 +77,10 @@ def evaluate(
     """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
 
     Args:
-        agent: `random`, `oracle` (the scenario's own script), `human`, `llm:MODEL`, `shipped`, `shipped:NAME`, or the
-            path of a checkpoint or of a run, which stands for whoever played there; a `Player`; or a policy of your
-            own, see `Policy`, a model of Stable-Baselines3, or a function from observations to actions.
+        agent: `random`, `oracle` (the scenario's own script), `rival:NAME` (one of its rivals), `human`, `llm:MODEL`,
+            `shipped`, `shipped:NAME`, or the path of a checkpoint or of a run, which stands for whoever played there; a
+            `Player`; or a policy of your own, see `Policy`, a model of Stable-Baselines3, or a function from
+            observations to actions.
         scenario: a path or a name, with `+variants` and `?parameters`; None: that of the run.
         episodes: how many. Rooms are the same for every agent, on every machine.
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
@@ -87,8 +89,8 @@ def evaluate(
         trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
             that they show what can be learnt within a session. A person remembers all of a session in any case.
         seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, a trained agent,
-            `llm:MODEL`, or a `Player`. The agent that is tested plays on the seats that are left, a language model on
-            the first of them alone, and results are those of the first.
+            `llm:MODEL`, or a `Player`; the agent also `rival:NAME`. The one that is tested plays on the seats that are
+            left, a language model or a rival on the first of them alone, and results are those of the first.
         options: of a trained agent `greedy`, `seed`, `device`, `net` and `algorithm`, of `random` the `seed`; of a
             language model those of `ModelOptions`; of a language model and of a person `tell`, `goal` and `language`,
             see `Player`; of a person `view`, and `participant`, with which the name of the session's folder begins.

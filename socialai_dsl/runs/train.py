@@ -197,6 +197,9 @@ def _with_partners(config: RunConfig, program: Playable) -> RunConfig:
     pools = _pools(config, program)
     for seat, players in pools.items():
         for player in players:
+            if player.rival is not None:
+                variant = f"--seat {AGENT}=script plays it on the variant {config.scenario}+{player.rival}"
+                raise OptionError("seat", f"got {player.agent!r} for {seat}, expected no rival; {variant}")
             if player.is_model or player.is_person:
                 raise OptionError(
                     "seat", f"got {player.agent!r} for {seat}, expected script, random or a trained agent"

@@ -54,6 +54,8 @@ BEYOND = {
     "novel/turn_taking": 2,
     "novel/whisper": 3,
     "together/commons_together": 1,  # a dilemma, of which nothing is to be known
+    "together/levers_together": 2,
+    "together/reference_game_together": 2,
 }
 
 CLAIMING_NOTHING = [

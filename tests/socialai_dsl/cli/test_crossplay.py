@@ -97,7 +97,10 @@ def test_nothing_is_left_of_what_cannot_be_played(tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["random", "--on", "talkitout"], "only the agent has a seat"),
-        (["human", "--on", SCENARIO], "expected random, oracle, a run, a checkpoint or a language model"),
+        (
+            ["human", "--on", SCENARIO],
+            "expected random, oracle, a rival, a run, a checkpoint or a language model",
+        ),
         (["llm:stub", "--on", SCENARIO], "--out: got none, expected a folder for the transcripts"),
         (
             ["random", "--on", SCENARIO, "--budget", "5"],

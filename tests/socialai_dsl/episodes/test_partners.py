@@ -53,6 +53,42 @@ def test_cross_play_says_what_each_would_be_told_alone() -> None:
     assert np.array_equal(found.results[0, 1].others["partner"][0], as_partner.success)
 
 
+def test_a_rival_plays_the_agent_as_in_the_variant_of_its_name() -> None:
+    rival = sd.evaluate("rival:hurries", LEVERS, episodes=20)
+    variant = sd.evaluate("oracle", f"{LEVERS}+hurries", episodes=20, seats={"partner": "script"})
+    assert 0 < rival.result.success_rate < 1
+    assert np.array_equal(rival.result.success, variant.result.success)
+    for trace, won in zip(rival.traces(range(20)), rival.result.success, strict=True):
+        assert trace.succeeded == won
+    beside = sd.evaluate("oracle", LEVERS, episodes=20, seats={"agent": "rival:hurries"})
+    assert beside.seat == "partner"
+    assert np.array_equal(beside.result.success, rival.result.others["partner"][0])
+
+
+def test_rivals_are_rows_of_cross_play_alone() -> None:
+    players = [Player("oracle"), Player("rival:hurries"), Player("random")]
+    found = cross_play(players, LEVERS, load(LEVERS), 20)
+    assert (found.agents, found.others) == ([0, 1, 2], [0, 2])
+    alone = sd.evaluate("rival:hurries", LEVERS, episodes=20, seats={"partner": "random"}).result
+    assert np.array_equal(found.results[1, 2].success, alone.success)
+    rates = [found.rate(pair, "agent").success for pair in ((0, 2), (1, 0), (1, 2), (2, 0))]
+    others = found.with_others("agent")
+    assert others is not None
+    assert others.success == pytest.approx(np.mean(rates))
+
+
+@pytest.mark.parametrize(
+    ("players", "said"),
+    [
+        (["oracle", "rival:hurry"], "has no rival 'hurry'; it has hurries"),
+        (["rival:hurries"], "got rivals alone, who play agent"),
+    ],
+)
+def test_rivals_that_cannot_play_are_refused_before_anybody_plays(players: list[str], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        cross_play([Player(name) for name in players], LEVERS, load(LEVERS), 10**9)
+
+
 def test_one_who_plays_alone_meets_the_same_partner() -> None:
     loaded, seats = seating({"agent": Player("oracle")}, LEVERS, load(LEVERS))
     env = sd.make(compiled(loaded), seats=seats)
@@ -71,6 +107,10 @@ def test_one_who_plays_alone_meets_the_same_partner() -> None:
         (
             [("partnr", "script")],
             "--seat: got 'partnr', expected one of agent, partner; did you mean 'partner'?",
+        ),
+        (
+            [("partner", "rival:hurries")],
+            "--seat: got 'rival:hurries' for partner, but a rival is a frame for the seat 'agent' alone",
         ),
         ([("partner", "script"), ("partner", "random")], "--seat: got 2 players for partner, expected one"),
         (

@@ -34,6 +34,15 @@ def played(players: list[str], *seats: str) -> dict[str, Any]:
     return {"scenario": "together/game", "episodes": 80, "players": players, "seats": found}
 
 
+UNPLAYED = {
+    "bob": {
+        "with_themselves": None,
+        "with_others": None,
+        "cells": [{"agent": "b", "others": "a", **rate(0.5)}],
+    }
+}
+
+
 def write(folder: Path, content: Any) -> Path:
     folder.mkdir(parents=True)
     (folder / "crossplay.json").write_text(content if isinstance(content, str) else json.dumps(content))
@@ -65,6 +74,25 @@ def test_figures_stay_in_their_cells_and_names_apart(players: list[str], seats: 
         boxes = [label.get_window_extent() for label in axes.get_yticklabels()]
         assert all(not one.overlaps(other) for one, other in pairwise(boxes))
         assert min(box.x0 for box in boxes) >= 0, "names are not cut off"
+
+
+def test_pairs_that_did_not_play_are_empty_and_who_sat_nowhere_has_no_row(tmp_path: Path) -> None:
+    content = played(["script", "rival", "random"], "agent", "bob")
+    for found in content["seats"].values():
+        found["cells"] = [
+            cell for cell in found["cells"] if cell["others"] != "rival" and cell["agent"] != "random"
+        ]
+        found["cells"].pop()
+        found["with_themselves"] = None
+    (axes, _) = matrices_figure(CrossPlayRecord.model_validate(content)).get_axes()
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["script", "rival"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["script", "random"]
+    assert len(axes.texts) == 2 * 3
+    out = tmp_path / "report"
+    assert main(["report", str(write(tmp_path / "there", content)), "--out", str(out)]) == 0
+    page = Page((out / "index.html").read_text(encoding="utf-8"))
+    assert page.table("with themselves")[0][1:] == ["–", "0.250 [0.150, 0.350]"]
+    assert len(page.table("plays the others")) == 3
 
 
 def _in_its_cell(axes: Axes, text: Any) -> bool:
@@ -138,7 +166,11 @@ def test_it_stands_alone_and_with_runs_that_belong_to_no_experiment(tmp_path: Pa
     ("content", "message"),
     [
         ("[]", "crossplay.json: expected what `socialai crossplay --out` writes"),
-        (played(["a"], "agent") | {"players": ["a", "b"]}, "a cell of agent for each pair"),
+        (played(["a"], "agent") | {"players": ["a", "b"]}, "cells of each of the players"),
+        (
+            played(["a"], "agent") | {"seats": {**played(["a"], "agent")["seats"], **UNPLAYED}},
+            "a cell of bob for each pair that played",
+        ),
     ],
 )
 def test_a_damaged_file_is_said(
