@@ -37,7 +37,7 @@ def players(programs: Collection[Program], name: str | None) -> str:
     named = "" if name is None else f"{printable(name)}, "
     return (
         f"You are {named}one of {_COUNTS[count - 1]} players, each with a body of its own: you move and speak with "
-        "yours, and see and hear from where it stands."
+        "yours, and see and hear from where it stands. Once it is out of the room, you see nothing but walls."
     )
 
 

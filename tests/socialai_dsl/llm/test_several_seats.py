@@ -120,6 +120,20 @@ class Speaker:
         return np.array([[6, 1, 1, 2]])
 
 
+def test_who_is_gone_sees_what_it_was_told() -> None:
+    """It goes into the lava, and the other one plays on."""
+    episode = Episode(HELP, seats={"jill": RANDOM})
+    episode.reset(test_episode=0)
+    assert "Once it is out of the room, you see nothing but walls." in episode.instructions
+    for act in ("right", "forward", "left"):
+        turn = episode.step(f"Act: {act}")
+    assert not turn.done
+    seen = [line for line in turn.text.splitlines() if line.startswith("- ")]
+    assert len(seen) == 1
+    assert seen[0].startswith("- a wall: ")
+    assert turn.text.endswith("You hear nothing.")
+
+
 def test_who_plays_alone_is_told_nothing_of_players() -> None:
     for name in ("talkitout", "help", "social_env"):
         episode = Episode(name)
