@@ -204,6 +204,7 @@ def _flags(allocation: Allocation) -> int:
         Flag.SHOWS_CARRYING: checked.shows_carrying,
         Flag.CARRYING: any(entity.carryable for entity in checked.entities),
         Flag.SEATS: bool(checked.seated),
+        Flag.SEATS_HIDDEN: checked.seats_hidden,
     }
     return sum(flag for flag, on in flags.items() if on)
 

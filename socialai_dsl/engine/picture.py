@@ -62,9 +62,11 @@ def take_pictures(row: Row, link: int, book: Any, number: int) -> None:
 
 @outline
 def _take_picture_of(row: Row, link: int, book: Any, number: int, seat: int) -> None:
-    """Of a seat other than the agent's; its own cell tells which one it is."""
+    """Of a seat other than the agent's; its own cell tells which one it is, unless that is hidden."""
     stay_outline()
     _take_picture(row, link, book, number + seat, seat_word(row, seat, SeatColumn.ENTITY))
+    if row.program[Header.FLAGS] & Flag.SEATS_HIDDEN:
+        return
     image = uint32_of(book, ArrayId.IMAGE, number + seat)
     image[OWN_PLACE] = (image[OWN_PLACE] & 0xFFFFFF) | seat << 24
     if row.program[row.program[Header.SIZE] + Link.MORE] > 0:

@@ -133,6 +133,7 @@ class Flag(IntEnum):
         256  # an entry of an inbox has three registers: class, speaker, noun (-1 none); else only the class
     )
     SEATS = 2048  # others than the agent have a seat; behind the header stands the seat table, see SeatColumn
+    SEATS_HIDDEN = 4096  # the own cell of the picture does not tell which seat it is
 
 
 class Register(IntEnum):

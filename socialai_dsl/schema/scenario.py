@@ -601,6 +601,10 @@ class Observe(Model):
         description="marked: each line in `tokens` begins with a mark of who says it, `<Ann>`, which is no word",
     )
     own_voice: bool = Field(False, description="whether the agent hears itself")
+    seats: Literal["shown", "hidden"] = Field(
+        "shown",
+        description="of several: whether its own cell in the image tells a player which seat it has",
+    )
     channels: ListOf[Channel | LookName] | None = Field(
         None,
         description="the first 4, 6 or 8, carrying, looks; default: 4, carrying where something can be carried, looks",

@@ -529,6 +529,7 @@ class _Run:
             overheard=scenario.overheard,
             seated=tuple(self._symbols.numbers[name] for name in seats.seated(self._symbols)[1:]),
             own_voice=scenario.observe.own_voice,
+            seats_hidden=scenario.observe.seats == "hidden",
             computed=computed,
             remembered=tuple(resolver.registers.remembered),
             memories=remembered,

@@ -598,6 +598,7 @@ class CheckedScenario:
     picture_before_npcs: bool
     names_shown: bool
     own_voice: bool
+    seats_hidden: bool
     computed: tuple[ComputedStatus, ...] = ()
     remembered: tuple[Drawn, ...] = ()
     memories: tuple[MemoryPlan, ...] = ()

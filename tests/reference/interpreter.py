@@ -110,6 +110,7 @@ class Reference:
             fillers=scenario.grammar.fillers,
             npcs_hidden=scenario.observe.npcs == "hidden",
             own_voice=scenario.observe.own_voice,
+            seats_hidden=scenario.observe.seats == "hidden",
             overheard=scenario.overheard,
             egocentric=scenario.observe.directions == "egocentric",
             occlusion=scenario.room.occlusion,

@@ -36,7 +36,7 @@ def picture(world: World, canvas: tuple[int, int], viewer: Entity) -> np.ndarray
                 carried = world.carried_by(viewer)
                 image[i, j, :4] = EMPTY if carried is None else thing_shown(carried)
                 # Its own cell tells a player on which seat it sits.
-                number = world.seats.index(viewer)
+                number = 0 if world.seats_hidden else world.seats.index(viewer)
                 image[i, j, 3] = number or image[i, j, 3]
                 image[i, j, behind:] = looks(world, carried)
             else:

@@ -271,6 +271,7 @@ class Observe:
     lines: str = "plain"
     directions: str = "absolute"
     own_voice: bool = False
+    seats: str = "shown"
     channels: tuple[str, ...] | None = None
     tone: str | None = None
 

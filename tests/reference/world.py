@@ -255,6 +255,7 @@ class World:
     always_audible: frozenset[str] = frozenset()
     npcs_hidden: bool = False
     own_voice: bool = False
+    seats_hidden: bool = False  # whether the picture does not tell which seat it is
     overheard: bool = True  # whether others hear what is said to somebody
     egocentric: bool = False
     occlusion: bool = False

@@ -24,6 +24,8 @@ def give_seats(made: dict[str, Any], rng: Random) -> dict[str, Any]:
         for rule in rules:
             rule.pop("addressed", None)
     names = ["agent", *(name for name, member in made["cast"].items() if "seat" in member)]
+    if rng.random() < 0.2:
+        made["observe"] = {**made.get("observe", {}), "seats": "hidden"}
     for entry in made["outcome"]:
         if "success" in entry:
             share_success(entry, names, rng)
