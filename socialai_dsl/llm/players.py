@@ -264,7 +264,7 @@ def _kept_model(program: Playable, seat: Seat, folder: Path) -> ModelPolicy:
     except (KeyError, TypeError):
         raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
     text = TextSeat(program, **prompting.of_episodes, seat=seat)
-    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody)
+    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody, compares=False)
 
 
 async def _nobody(conversation: Conversation) -> Answer:
@@ -377,6 +377,7 @@ def play_games(
 
     Raises:
         EndpointError: an endpoint does not answer. What was played is kept.
+        SettingsMismatchError: a transcript is of an episode that goes another way now.
         OSError: a transcript cannot be read or written.
     """
     return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep))
@@ -407,7 +408,7 @@ async def _play(
             playing = {seat: policies.get(seat) or beside.policies[seat] for seat in rooms.seats}
             try:
                 await play_async(rooms, playing, TestEpisodes(episodes, trials, sessions))
-            except (EndpointError, OSError) as error:
+            except (EndpointError, OSError, SettingsMismatchError) as error:
                 failures.append(error)
 
     async with contextlib.AsyncExitStack() as open_ones:
@@ -523,6 +524,7 @@ class ModelPolicy(Observer):
         ask: the model's answer to a conversation; raises EpisodeOver to leave that episode as it is, and PolicyDone to
             leave all that are left.
         progress: is told of each episode that is over.
+        compares: whether what a transcript holds must be about what is seen now.
 
     Attributes:
         played: these episodes.
@@ -536,7 +538,9 @@ class ModelPolicy(Observer):
         place: Callable[[int], Path],
         ask: Callable[[Conversation], Awaitable[Answer]],
         progress: Callable[[PlayedEpisode], None] | None = None,
+        compares: bool = True,
     ) -> None:
+        self._compares = compares
         self._seat, self._prompting, self._place, self._ask = seat, prompting, place, ask
         self._progress = progress
         self._rooms: Rooms
@@ -590,6 +594,11 @@ class ModelPolicy(Observer):
         record = self._conversation.stored()
         if record is None:
             record = self._conversation.write(await self._ask(self._conversation))
+        elif self._compares and record["observation"] != self._conversation.text:
+            raise SettingsMismatchError(
+                f"{self._place(int(self._rooms.numbers[0]))} tells of an episode that goes another way now, as another "
+                "player acts otherwise"
+            )
         return self._conversation.take(record)
 
     def _note(self) -> None:
@@ -641,6 +650,11 @@ class Conversation:
     def stored(self) -> dict[str, Any] | None:
         """The next record that the transcript holds already; None if there is none."""
         return next(self._records, None)
+
+    @property
+    def text(self) -> str:
+        """What the model is shown now."""
+        return self._text
 
     @property
     def exchanges(self) -> Sequence[list[Mapping[str, Any]]]:

@@ -171,9 +171,10 @@ def _evaluated(
         # As a run that trained nothing, so that reports take it as one.
         settings = {"scenario": kept, "agent": short_name(playing.agent), "seed": playing.seed}
         if partners:
-            settings |= {
-                "seats": keep_partners(place, {seat: [called(one)] for seat, one in partners.items()})
-            }
+            # A policy of one's own is not kept, so what it played is not played again.
+            networks = {seat: [called(one)] for seat, one in partners.items() if one.policy is None}
+            own = {seat: [one.agent] for seat, one in partners.items() if one.policy is not None}
+            settings |= {"seats": keep_partners(place, networks) | own}
         write_json(place / CONFIG, settings)
         made.update(place.iterdir())
         played = play_test_set(playing, scenario, loaded, *asked)

@@ -15,7 +15,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.envs.seats import RANDOM, SCRIPT
 from socialai_dsl.episodes.players import Player
-from socialai_dsl.errors import OptionError, RunFailed
+from socialai_dsl.errors import OptionError, RunFailed, UsageError
 from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import INVALID, LEFT, scripted_reply
 from socialai_dsl.llm.view import LastStep
@@ -392,3 +392,34 @@ def test_a_folder_holds_episodes_with_the_same_players(tmp_path: Path) -> None:
         sd.evaluate("llm:stub", HELP, 1, out=tmp_path, seats={"jill": "script"}, **asked(stub))
         with pytest.raises(ValueError, match="played with another players; choose another folder"):
             sd.evaluate("llm:stub", HELP, 1, out=tmp_path, seats={"jill": "random"}, **asked(stub))
+
+
+class Moody:
+    """Acts otherwise each time it is asked."""
+
+    def __init__(self) -> None:
+        self._generator = np.random.default_rng()
+
+    def reset(self, mask: Any, episodes: Any = None) -> None:
+        """Nothing to forget."""
+
+    def act(self, observation: Any) -> Any:
+        return self._generator.integers(0, [8, 2, 2, 2], (len(observation["tokens"]), 4))
+
+
+def test_a_transcript_is_not_mixed_with_an_episode_that_goes_another_way(tmp_path: Path) -> None:
+    """What was played can be looked at, and it is said that it cannot go on."""
+    with endpoint(lambda _: "Act: left") as stub:
+        options = {
+            "out": tmp_path,
+            "record": 0,
+            "seats": {"jill": Player("moody", policy=Moody())},
+            **asked(stub),
+        }
+        found = sd.evaluate("llm:stub", HELP, 2, **options)
+        with pytest.raises(
+            UsageError, match=r"tells of an episode that goes another way now.*another folder"
+        ):
+            sd.evaluate("llm:stub", HELP, 2, **options)
+    traces = sd.replay(tmp_path / "help_together", test_episodes=[0, 1])
+    assert [len(trace.moments) - 1 for trace in traces] == found.result.lengths.tolist()
