@@ -57,7 +57,7 @@ def check_seats(symbols: Symbols, findings: Findings) -> None:
         if scenario.observe.seats == "hidden":
             message = "the agent alone has a seat, so there is nothing to hide"
             hint = cures.propose("delete it", cures.deleted(places, ("observe", "seats")))
-            findings.error("S107", message, places.key_span(("observe", "seats")), hint=hint)
+            findings.warning("W317", message, places.key_span(("observe", "seats")), hint=hint)
         return
     for is_there, path, what in (
         (scenario.grammar.to is not None, ("grammar", "to"), "`grammar.to`"),
