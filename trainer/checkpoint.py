@@ -76,6 +76,11 @@ class Checkpoint:
         """The same without what only further training needs."""
         return Checkpoint(self.meta, {n: value for n, value in self.tensors.items() if n.startswith("net.")})
 
+    def has_network_of(self, other: Checkpoint) -> bool:
+        """Whether both have the same weights."""
+        own, others = self.part("net"), other.part("net")
+        return own.keys() == others.keys() and all(torch.equal(own[name], others[name]) for name in own)
+
     def part(self, prefix: str) -> dict[str, Tensor]:
         """The tensors under `prefix.`, without it."""
         start = prefix + "."

@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "players",
         nargs="+",
         metavar="PLAYER",
-        help="the folder of a run, a checkpoint, shipped:NAME, random, oracle (each seat's own script), llm:MODEL, or "
-        "rival:NAME, which plays the agent alone",
+        help="the folder of a run, a checkpoint, shipped:NAME, random, oracle (each seat's own script), llm:MODEL, "
+        "rival:NAME, which plays the agent alone, or a person's session of `socialai evaluate human`",
     )
     parser.add_argument(
         "--on", required=True, metavar="SCENARIO", help="the scenario to play, with several seats"
@@ -65,16 +65,22 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def _matrix(found: CrossPlay, seat: str) -> list[str]:
-    """The success of a seat as lines; columns have numbers where names would take too much room."""
-    names = heads = list(found.names)
-    if (max(5, *map(len, names)) + 2) * (len(found.others) + 1) > _WIDTH:
-        heads = [str(number) for number in range(1, len(heads) + 1)]
-        names = [f"{head} {name}" for head, name in zip(heads, names, strict=True)]
+    """The success of a seat as lines; columns have the numbers of rows where names would take too much room."""
+    names, heads = dict(enumerate(found.names)), dict(enumerate(found.names))
+    if (max(5, *map(len, found.names)) + 2) * (len(found.others) + 1) > _WIDTH:
+        for number, one in enumerate(found.agents, start=1):
+            names[one], heads[one] = f"{number} {names[one]}", str(number)
     cells = [["", *(heads[other] for other in found.others)]]
     for one in found.agents:
         pairs = [(one, other) for other in found.others]
-        rates = [f"{found.rate(pair, seat).success:.2f}" if pair in found.results else "" for pair in pairs]
-        cells.append([names[one], *rates])
+        cells.append([names[one], *(_cell(found, pair, seat) for pair in pairs)])
     means = {"with themselves": found.with_themselves(seat), "with others": found.with_others(seat)}
     told = ", ".join(f"{name} {mean}" for name, mean in means.items() if mean is not None)
     return [*columns(cells), f"{told} (95% intervals over rooms)"]
+
+
+def _cell(found: CrossPlay, pair: tuple[int, int], seat: str) -> str:
+    if pair not in found.results:
+        return ""
+    episodes = f" of {found.results[pair].episodes}" if pair in found.recorded else ""
+    return f"{found.rate(pair, seat).success:.2f}{episodes}"

@@ -306,6 +306,11 @@ def session_folder(parent: Path, participant: str | None = None) -> Path:
     return parent / (stamp if participant is None else f"{participant}-{stamp}")
 
 
+def participant_of(session: Path) -> str:
+    """Whose session a folder of `session_folder` is: the name of the person, if there is one, else the time."""
+    return re.sub(r"(?<=.)-\d{8}T\d{6}Z-[0-9a-f]{6}$", "", session.name)
+
+
 def default_folder(agent: str) -> Path:
     """Where the episodes of a model go unless the user says otherwise."""
     return Path(

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX, Player
+from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX, Player, participant_of
 from socialai_dsl.episodes.results import EvalResult, interval_over_rooms
 from socialai_dsl.episodes.scripts import with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
@@ -30,14 +31,18 @@ class CrossPlay:
 
     Attributes:
         scenario: what was played. seats: its seats, the agent's first. names: of the players.
+        episodes: of each pair that played here.
         results: by (who plays the agent, who plays the others), as indices into `names`; pairs that cannot play
             together are left out.
+        recorded: those among them that people have played before, in rooms of their own number; no mean has them.
     """
 
     scenario: str
     seats: tuple[str, ...]
     names: tuple[str, ...]
+    episodes: int
     results: Mapping[tuple[int, int], EvalResult]
+    recorded: frozenset[tuple[int, int]] = frozenset()
 
     @property
     def agents(self) -> list[int]:
@@ -62,6 +67,7 @@ class CrossPlay:
         return self._mean([pair for pair in self.results if pair[0] != pair[1]], seat)
 
     def _mean(self, pairs: Sequence[tuple[int, int]], seat: str) -> Rate | None:
+        pairs = [pair for pair in pairs if pair not in self.recorded]
         return _rate(self._won(pairs, seat)) if pairs else None
 
     def _won(self, pairs: Sequence[tuple[int, int]], seat: str) -> NDArray[np.bool_]:
@@ -73,7 +79,7 @@ class CrossPlay:
         """The figures as a JSON-able object."""
         found: dict[str, Any] = {
             "scenario": self.scenario,
-            "episodes": next(iter(self.results.values())).episodes,
+            "episodes": self.episodes,
             "players": list(self.names),
             "seats": {},
         }
@@ -86,12 +92,27 @@ class CrossPlay:
                     {
                         "agent": self.names[one],
                         "others": self.names[other],
+                        "episodes": self.results[one, other].episodes,
                         **self.rate((one, other), seat).figures(),
                     }
                     for one, other in sorted(self.results)
                 ],
             }
         return found
+
+
+class Recording(NamedTuple):
+    """Test episodes that a person has played before, with one other player on all other seats.
+
+    Attributes:
+        partner: that player, as an index into the players of a cross-play.
+        plays_agent: whether the person played the agent; else the partner did.
+        result: what came of them, for all seats.
+    """
+
+    partner: int
+    plays_agent: bool
+    result: EvalResult
 
 
 class Rate(NamedTuple):
@@ -114,17 +135,23 @@ def _rate(won: NDArray[np.bool_]) -> Rate:
 
 
 def cross_play(
-    players: Sequence[Player], scenario: str, loaded: Loaded, episodes: int = 100, out: Path | None = None
+    players: Sequence[Player],
+    scenario: str,
+    loaded: Loaded,
+    episodes: int = 100,
+    out: Path | None = None,
+    recordings: Mapping[int, Recording] = MappingProxyType({}),
 ) -> CrossPlay:
     """Let everybody play with everybody, and with themselves, on the same test episodes.
 
     Args:
-        players: `random`, `oracle`, which is each seat's own script, trained agents, language models, or rivals, which
-            play the agent alone.
+        players: `random`, `oracle`, which is each seat's own script, trained agents, language models, rivals, which
+            play the agent alone, or people, who have played before.
         scenario: as it was asked for.
         loaded: the same.
         episodes: of each pair.
         out: gets a folder for each pair with a language model, with its transcripts.
+        recordings: of each person, as an index into the players, what they have played.
 
     Raises:
         UsageError: the scenario has one seat, or a player does not fit it or cannot be asked here, or a language model
@@ -139,23 +166,28 @@ def cross_play(
         raise UsageError(
             f"{scenario}: only the agent has a seat; `seat: open` gives one to another member of the cast"
         )
-    others = [number for number, player in enumerate(players) if player.rival is None]
-    if not others:
+    playing = [number for number in range(len(players)) if number not in recordings]
+    others = [number for number in playing if players[number].rival is None]
+    if not others and not recordings:
         raise UsageError(
             f"{scenario}: got rivals alone, who play {seats[0]}; expected a player for {seats[1]}, too"
         )
     for player in players:
         if player.rival is not None:
             with_frame_of(player, scenario, loaded)  # so that a slip is told before anybody plays
-    names, results = names_of(players), {}
-    for one, other in product(range(len(players)), others):
+    names, results = names_of(players), dict[tuple[int, int], EvalResult]()
+    for one, other in product(playing, others):
         place = None if out is None else out / _folder_name(f"{names[one]} with {names[other]}")
         player, partner = (replace(players[number], out=place) for number in (one, other))
         partners = dict.fromkeys(seats[1:], partner)
         results[one, other] = play_test_set(
             player, scenario, loaded, program, episodes, partners=partners
         ).result
-    return CrossPlay(scenario, seats, tuple(names), results)
+    recorded = {
+        (number, one.partner) if one.plays_agent else (one.partner, number): one.result
+        for number, one in recordings.items()
+    }
+    return CrossPlay(scenario, seats, tuple(names), episodes, results | recorded, frozenset(recorded))
 
 
 def _folder_name(pair: str) -> str:
@@ -164,9 +196,9 @@ def _folder_name(pair: str) -> str:
 
 def names_of(players: Sequence[Player]) -> list[str]:
     """A short name for each player: the script is `script`, a file or folder has its last part and as many of those
-    before it as tell it from others, and whoever plays twice has a number.
+    before it as tell it from others, a person is the participant, and whoever plays twice has a number.
     """
-    parts = [("script",) if one.is_script else _parts(one.agent) for one in players]
+    parts = [_parts(one) for one in players]
     lengths = [1] * len(parts)
     names = [part[-1] for part in parts]
     for _ in range(max(map(len, parts))):
@@ -179,6 +211,11 @@ def names_of(players: Sequence[Player]) -> list[str]:
     return names
 
 
-def _parts(agent: str) -> tuple[str, ...]:
-    named = agent.startswith((PREFIX, MODEL_PREFIX, RIVAL_PREFIX))
-    return (agent,) if named else Path(agent).parts or (agent,)
+def _parts(player: Player) -> tuple[str, ...]:
+    """What a player can be called by, the last part first of all."""
+    if player.is_script:
+        return ("script",)
+    if player.is_person and player.run is not None:
+        return (participant_of(player.run),)
+    named = player.agent.startswith((PREFIX, MODEL_PREFIX, RIVAL_PREFIX))
+    return (player.agent,) if named else Path(player.agent).parts or (player.agent,)

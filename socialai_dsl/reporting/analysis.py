@@ -432,7 +432,7 @@ def _pairs(crossplay: CrossPlayRecord) -> list[dict[str, Any]]:
             "seat": seat,
             "agent": cell.agent,
             "others": cell.others,
-            "test_episodes": crossplay.episodes,
+            "test_episodes": cell.episodes,
             "success_rate": cell.success,
             "success_low": cell.interval[0],
             "success_high": cell.interval[1],

@@ -54,8 +54,9 @@ def matrix_figure(found: CrossPlayRecord, seats: Sequence[str]) -> Figure:
 def matrix_size(found: CrossPlayRecord) -> tuple[float, float]:
     """Inches of a matrix with its names and means."""
     wide, high = _cell(found)
-    longest = max(len(_label(name)) for name in found.players)
-    above = 0.6 if _numbered(found) else 0.5 + (longest * 0.055 if longest > _SHORT else 0.0)
+    longest = max(len(_label(name)) for name in found.agents)
+    head = max(map(len, _heads(found)))
+    above = 0.6 + (head * 0.055 if head > _SHORT else 0.0)
     rows, columns = len(found.agents), len(found.others)
     return max(4.2, columns * wide + 0.9 + longest * 0.075), rows * high + above + 1.3
 
@@ -67,6 +68,14 @@ def _cell(found: CrossPlayRecord) -> tuple[float, float]:
 def _numbered(found: CrossPlayRecord) -> bool:
     """Whether columns have numbers for names."""
     return len(found.others) > _FEW
+
+
+def _heads(found: CrossPlayRecord) -> list[str]:
+    """What stands over each column: the number of its row where there are many, else the name."""
+    if not _numbered(found):
+        return [_label(name) for name in found.others]
+    rows = {name: str(number) for number, name in enumerate(found.agents, start=1)}
+    return [rows.get(name) or _label(name) for name in found.others]
 
 
 def _draw(figure: Figure | SubFigure, found: CrossPlayRecord, seats: Sequence[str]) -> None:
@@ -89,13 +98,16 @@ def _matrix(axes: Axes, found: CrossPlayRecord, seats: Sequence[str]) -> None:
     large = 8.5 if _numbered(found) else 10.0
     for row, column in zip(*(~np.isnan(success)).nonzero(), strict=True):
         rate = success[row, column]
-        low, high = rates[rows[row], columns[column]].interval
+        cell = rates[rows[row], columns[column]]
+        below = f"{cell.interval[0]:.2f}–{cell.interval[1]:.2f}"
+        if cell.episodes != found.episodes:
+            below += f"\n{cell.episodes:,} episodes"
         ink = "white" if rate > _DARK else INK
         centre: dict[str, Any] = {"ha": "center", "color": ink}
         axes.text(
             column + 0.5, row + 0.46, f"{rate:.2f}", va="bottom", fontsize=large, fontweight="bold", **centre
         )
-        axes.text(column + 0.5, row + 0.58, f"{low:.2f}–{high:.2f}", va="top", fontsize=large - 3.0, **centre)
+        axes.text(column + 0.5, row + 0.58, below, va="top", fontsize=large - 3.0, linespacing=1.0, **centre)
     for one in (one for one, other in rates if one == other):
         corner = columns.index(one) + 0.03, rows.index(one) + 0.04
         axes.add_patch(Rectangle(corner, 0.94, 0.92, fill=False, edgecolor=COLOURS[1], linewidth=1.8))
@@ -103,12 +115,10 @@ def _matrix(axes: Axes, found: CrossPlayRecord, seats: Sequence[str]) -> None:
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0, labelcolor=INK, labelsize=8.5)
-    names, heads = {name: _label(name) for name in found.players}, [_label(name) for name in columns]
+    names, heads = [_label(name) for name in rows], _heads(found)
     if _numbered(found):
-        numbers = {name: str(number) for number, name in enumerate(found.players, start=1)}
-        names = {name: f"{label}  {numbers[name]}" for name, label in names.items()}
-        heads = [numbers[name] for name in columns]
-    axes.set_yticks(np.arange(len(rows)) + 0.5, [names[name] for name in rows])
+        names = [f"{name}  {number}" for number, name in enumerate(names, start=1)]
+    axes.set_yticks(np.arange(len(rows)) + 0.5, names)
     slanted = max(map(len, heads)) > _SHORT
     axes.set_xticks(
         np.arange(len(columns)) + 0.5,

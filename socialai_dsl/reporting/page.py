@@ -490,7 +490,9 @@ def _ending(summary: Summary, name: str) -> str:
 def _crossplay(anchor: str, found: CrossPlayRecord) -> dict[str, Any]:
     """The matrices of a cross-play, the means in a table, and all pairs in another."""
     groups = list(enumerate(found.alike, start=1))
+    recorded = any(cell.episodes != found.episodes for seat in found.seats.values() for cell in seat.cells)
     return {
+        "recorded": recorded,
         "anchor": anchor,
         "title": f"Cross-play: {scenario_name(found.scenario)}",
         "episodes": found.episodes,
@@ -508,6 +510,7 @@ def _crossplay(anchor: str, found: CrossPlayRecord) -> dict[str, Any]:
             {
                 f"plays {next(iter(found.seats))}": cells[0].agent,
                 "plays the others": cells[0].others,
+                **({"test episodes": cells[0].episodes} if recorded else {}),
                 **{
                     f"success of {_seats_text(seats)}": _rate(cell)
                     for (_, seats), cell in zip(groups, cells, strict=True)

@@ -147,6 +147,7 @@ class Cell(Rate):
 
     agent: str
     others: str
+    episodes: int = Field(ge=1)
 
 
 class SeatRecord(Record):
@@ -163,7 +164,7 @@ class CrossPlayRecord(Record):
     """`crossplay.json`.
 
     Attributes:
-        scenario: what was played. episodes: of each pair.
+        scenario: what was played. episodes: of each pair that played for it; people have played before, some of them.
         players: their names, each once. seats: the agent's first.
     """
 

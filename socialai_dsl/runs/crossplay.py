@@ -10,6 +10,7 @@ from socialai_dsl.atomic import write_json
 from socialai_dsl.episodes.players import MODEL_PREFIX, Agent, require_trainer
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.crossplay import CrossPlay, cross_play
+from socialai_dsl.evaluation.sessions import recordings_of, who_has_played
 from socialai_dsl.frontend import load
 from socialai_dsl.runs.evaluate import made_player
 from socialai_dsl.runs.folder import CROSSPLAY, new_folders
@@ -31,7 +32,7 @@ def crossplay(
 
     Args:
         agents: `random`, `oracle` (each seat's own script), runs, checkpoints, `llm:MODEL`, and `rival:NAME`, which
-            plays the agent alone; see `evaluate`.
+            plays the agent alone; see `evaluate`. The folder of a person's session there is the pair that it holds.
         scenario: a path or a name, with several seats.
         episodes: of each pair.
         out: a folder that gets the figures as `crossplay.json`, and a picture of them as PNG and SVG; reports take it.
@@ -48,20 +49,22 @@ def crossplay(
     if options and not any(models):
         raise OptionError(min(options), "it is for language models, and none plays")
     players = [
-        made_player(agent, [scenario], options if is_model else {}, None)
+        who_has_played(agent, scenario) or made_player(agent, [scenario], options if is_model else {}, None)
         for agent, is_model in zip(agents, models, strict=True)
     ]
-    if any(player.is_person for player in players):
+    if any(player.is_person and player.run is None for player in players):
         raise UsageError(
-            "crossplay: got a person; expected random, oracle, a rival, a run, a checkpoint or a language model"
+            "crossplay: got a person, expected random, oracle, a rival, a run, a checkpoint, a language model, or what "
+            "a person has played by `socialai evaluate human`"
         )
     if any(player.is_trained for player in players):
         require_trainer()
+    recordings = recordings_of(players, scenario, episodes)
     if out is None:
-        return cross_play(players, scenario, load(scenario), episodes)
+        return cross_play(players, scenario, load(scenario), episodes, recordings=recordings)
     require_libraries("matplotlib")
     with new_folders(Path(out)):
-        found = cross_play(players, scenario, load(scenario), episodes, Path(out))
+        found = cross_play(players, scenario, load(scenario), episodes, Path(out), recordings)
         write(found, Path(out))
     return found
 

@@ -99,7 +99,7 @@ def test_nothing_is_left_of_what_cannot_be_played(tmp_path: Path) -> None:
         (["random", "--on", "talkitout"], "only the agent has a seat"),
         (
             ["human", "--on", SCENARIO],
-            "expected random, oracle, a rival, a run, a checkpoint or a language model",
+            "a checkpoint, a language model, or what a person has played by `socialai evaluate human`",
         ),
         (["llm:stub", "--on", SCENARIO], "--out: got none, expected a folder for the transcripts"),
         (

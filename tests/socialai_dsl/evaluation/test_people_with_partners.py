@@ -8,10 +8,28 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.crossplay import Rate
+from socialai_dsl.evaluation.people import play_seed
 from socialai_dsl.play.screen import PlayApp
+from socialai_dsl.reporting.records import CrossPlayRecord
+from socialai_dsl.runs.crossplay import crossplay
 
 HELP = "together/help_together"
 HORIZON = 20
+
+WAIT = """scenario: wait
+horizon: 4
+actions: [left, right, forward]
+grammar: {templates: [<noun>], nouns: [hello]}
+room: {size: 5}
+cast:
+  agent: {name: Ann, at: [1, 1], frame: stay}
+  bob: {name: Bob, at: [3, 3], seat: open, frame: stay}
+frames: {stay: {states: {staying: {}}}}
+rivals: {turns: {states: {turning: {do: turn_to(right)}}}}
+outcome: [{success: t == 3, for: agent}]
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -51,3 +69,61 @@ def test_a_person_has_the_seat_that_is_left(seats: dict[str, str], own: str, tmp
         moment = trace.moments[1]
         assert (moment.did if own == "agent" else moment.seats[0].did) == "left"
         assert trace.moments[-1].ended is not None
+
+
+@pytest.mark.parametrize(
+    ("seats", "cell", "episodes"),
+    [
+        ({}, ("person", "script"), 2),
+        ({"bob": "random"}, ("person", "random"), 2),
+        ({"agent": "script"}, ("script", "person"), 2),
+        ({"agent": "rival:turns"}, ("rival:turns", "person"), 1),
+    ],
+)
+def test_what_a_person_has_played_is_a_cell_of_cross_play(
+    seats: dict[str, str], cell: tuple[str, str], episodes: int, tmp_path: Path
+) -> None:
+    """With the success of both seats; it is in no mean, and the person plays with nobody else."""
+    scenario = tmp_path / "wait.yaml"
+    scenario.write_text(WAIT, encoding="utf-8")
+    played = sd.evaluate(
+        "human", scenario, 2, out=tmp_path / "human", seats=seats, record=0, participant="p-1"
+    )
+    (session,) = (tmp_path / "human").iterdir()
+    assert played.folder is not None
+    players = ["oracle", "random", "rival:turns"]
+    found = crossplay([*players, session], str(scenario), max(episodes, 1), out=tmp_path / "with")
+    without = crossplay(players, str(scenario), episodes)
+    names = ["p-1" if name == "person" else name for name in cell]
+    pair = found.names.index(names[0]), found.names.index(names[1])
+    assert found.results.keys() - without.results.keys() == {pair}
+    assert found.results[pair].episodes == episodes
+    assert [found.rate(pair, seat).success for seat in ("agent", "bob")] == [1, 0]
+    for seat in found.seats:
+        assert found.with_themselves(seat) == without.with_themselves(seat)
+        assert found.with_others(seat) == without.with_others(seat)
+    record = CrossPlayRecord.model_validate_json((tmp_path / "with" / "crossplay.json").read_text())
+    assert {len(one.cells) for one in record.seats.values()} == {len(without.results) + 1}
+    again = crossplay([*players, played.folder], str(scenario), episodes)
+    assert again.figures() == found.figures()
+
+
+def test_a_trained_partner_is_known_by_its_network(tmp_path: Path) -> None:
+    scenario, run, other = tmp_path / "wait.yaml", tmp_path / "run", tmp_path / "other"
+    scenario.write_text(WAIT, encoding="utf-8")
+    for seed, folder in enumerate((run, other)):
+        options = {"frames": 64, "envs": 4, "horizon": 16, "eval_episodes": 1}
+        sd.train(str(scenario), out=folder, seed=seed, device="cpu", recipe="plain", **options)
+    sd.evaluate("human", scenario, 2, out=tmp_path / "human", seats={"agent": str(run)}, record=0)
+    (session,) = (tmp_path / "human").iterdir()
+    found = crossplay([other, run, session], str(scenario), 2)
+    assert found.recorded == {(1, 2)}
+    assert isinstance(found.with_others("agent"), Rate)
+    with pytest.raises(UsageError, match=r"played with .* as agent, expected one of the players named here"):
+        crossplay([other, session], str(scenario), 2)
+
+
+def test_practice_is_no_cell_of_cross_play(tmp_path: Path) -> None:
+    _, folder = play_seed(HELP, out=tmp_path)
+    with pytest.raises(UsageError, match="holds what `socialai play` keeps, which is no test"):
+        crossplay(["oracle", folder], HELP, 2)

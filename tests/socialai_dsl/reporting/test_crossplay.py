@@ -27,7 +27,9 @@ def played(players: list[str], *seats: str) -> dict[str, Any]:
     for seat in seats:
         shared = 0.9 if seat != seats[-1] or len(seats) == 2 else 0.1
         cells = [
-            {"agent": a, "others": b, **rate(shared if a == b else 0.25)} for a in players for b in players
+            {"agent": a, "others": b, "episodes": 80, **rate(shared if a == b else 0.25)}
+            for a in players
+            for b in players
         ]
         others = rate(0.25) if len(players) > 1 else None
         found[seat] = {"with_themselves": rate(shared), "with_others": others, "cells": cells}
@@ -38,7 +40,7 @@ UNPLAYED = {
     "bob": {
         "with_themselves": None,
         "with_others": None,
-        "cells": [{"agent": "b", "others": "a", **rate(0.5)}],
+        "cells": [{"agent": "b", "others": "a", "episodes": 80, **rate(0.5)}],
     }
 }
 
@@ -83,16 +85,20 @@ def test_pairs_that_did_not_play_are_empty_and_who_sat_nowhere_has_no_row(tmp_pa
             cell for cell in found["cells"] if cell["others"] != "rival" and cell["agent"] != "random"
         ]
         found["cells"].pop()
+        found["cells"][0]["episodes"] = 7
         found["with_themselves"] = None
     (axes, _) = matrices_figure(CrossPlayRecord.model_validate(content)).get_axes()
     assert [label.get_text() for label in axes.get_yticklabels()] == ["script", "rival"]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["script", "random"]
     assert len(axes.texts) == 2 * 3
+    assert [text.get_text() for text in axes.texts if "7 episodes" in text.get_text()] == [
+        "0.80–1.00\n7 episodes"
+    ]
     out = tmp_path / "report"
     assert main(["report", str(write(tmp_path / "there", content)), "--out", str(out)]) == 0
     page = Page((out / "index.html").read_text(encoding="utf-8"))
     assert page.table("with themselves")[0][1:] == ["–", "0.250 [0.150, 0.350]"]
-    assert len(page.table("plays the others")) == 3
+    assert [row[2] for row in page.table("plays the others")] == ["7", "80", "80"]
 
 
 def _in_its_cell(axes: Axes, text: Any) -> bool:
