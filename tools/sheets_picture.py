@@ -65,7 +65,8 @@ def diagram(name: str, figures: Mapping[str, Any]) -> "NDArray[np.uint8]":
     import numpy as np
     from PIL import Image
 
-    from socialai_dsl.reporting.dilemma import SchellingRecord, dilemma_figure
+    from socialai_dsl.reporting.dilemma import dilemma_figure
+    from socialai_dsl.reporting.records import SchellingRecord
     from socialai_dsl.reporting.style import saved
 
     drawn = saved(dilemma_figure(name, SchellingRecord.model_validate(figures)), "png")

@@ -85,7 +85,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pictures",
         type=Path,
         metavar="DIR",
-        help="for claims: draw the diagram of each claim `dilemma` there, as PNG and SVG",
+        help="for claims: draw the diagram of each claim `dilemma` there, as PNG and SVG, with its figures, which "
+        "`socialai report` takes",
     )
     parser.add_argument("--json", action="store_true", help="print the reports as a JSON array")
     parser.add_argument(

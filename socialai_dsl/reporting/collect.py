@@ -24,6 +24,8 @@ from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, Re
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.records import (
     CrossPlayRecord,
+    DilemmaRecord,
+    DilemmasRecord,
     Figures,
     ResultRecord,
     StartRecord,
@@ -36,6 +38,7 @@ from socialai_dsl.reporting.seeds import read_updates
 from socialai_dsl.runs.folder import (
     CONFIG,
     CROSSPLAY,
+    DILEMMAS,
     EPISODES,
     METRICS,
     RESULT,
@@ -127,6 +130,7 @@ class Experiment:
         source_sha256: digest of the experiment's file, empty if there is none.
         conditions: in the order of the file.
         crossplays: of scenarios with several seats, who played how well with whom. words: what was said there.
+        dilemmas: what those who cooperate and those who defect are paid there.
     """
 
     name: str
@@ -136,6 +140,7 @@ class Experiment:
     conditions: tuple[Condition, ...]
     crossplays: tuple[CrossPlayRecord, ...] = ()
     words: tuple[WordsRecord, ...] = ()
+    dilemmas: tuple[DilemmaRecord, ...] = ()
 
     @property
     def scenarios(self) -> list[str]:
@@ -219,7 +224,7 @@ def read_crossplay(path: Path) -> CrossPlayRecord | None:
         UnreadableError: it is damaged, or something else.
     """
     file = path / CROSSPLAY if path.is_dir() else path
-    if not file.exists() or file.name == WORDS:
+    if not file.exists() or file.name in (WORDS, DILEMMAS):
         return None
     return _figures(file, CrossPlayRecord, "socialai crossplay --out")
 
@@ -235,6 +240,19 @@ def read_words(path: Path) -> WordsRecord | None:
     if not file.exists() or file.name != WORDS:
         return None
     return _figures(file, WordsRecord, "socialai words --out")
+
+
+def read_dilemmas(path: Path) -> DilemmasRecord | None:
+    """What `socialai check --pictures` wrote into a folder or a file; None of a folder without it, and of other files.
+
+    Raises:
+        OSError: it cannot be read.
+        UnreadableError: it is damaged.
+    """
+    file = path / DILEMMAS if path.is_dir() else path
+    if not file.exists() or file.name != DILEMMAS:
+        return None
+    return _figures(file, DilemmasRecord, "socialai check --pictures")
 
 
 def _figures(file: Path, record: type[Kept], command: str) -> Kept:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from pydantic import Field, model_validator
 
-from socialai_dsl.experiments.record import Record
+from socialai_dsl.atomic import write_json
+from socialai_dsl.reporting.records import SchellingRecord
 from socialai_dsl.reporting.style import (
     INK,
     MUTED,
@@ -23,47 +23,15 @@ from socialai_dsl.reporting.style import (
     shown,
     styled,
 )
-from socialai_dsl.runs.folder import scenario_folder_name
+from socialai_dsl.runs.folder import DILEMMAS, scenario_folder_name
 
 _CHARACTERS: Final = 74  # of a line below the figure
 _NO_ERROR: Final = 1e-9
 """A standard error below this is none."""
 
 
-class SchellingRecord(Record):
-    """The figures of a claim `dilemma`, as `socialai check --json` prints them.
-
-    Attributes:
-        frames: of those who cooperate, and of those who defect.
-        cooperators, defectors: mean of what they are paid in an episode, while 0, 1, ... of the others cooperate.
-        cooperators_se, defectors_se: standard errors of these means over rooms.
-        verdict: whether it is a dilemma, and why.
-    """
-
-    frames: tuple[str, str]
-    cooperators: list[float] = Field(min_length=2)
-    defectors: list[float]
-    cooperators_se: list[float]
-    defectors_se: list[float]
-    verdict: str
-
-    @model_validator(mode="after")
-    def _as_many_of_each(self) -> Self:
-        if (
-            len(
-                {
-                    len(means)
-                    for means in (self.cooperators, self.defectors, self.cooperators_se, self.defectors_se)
-                }
-            )
-            > 1
-        ):
-            raise ValueError("expected as many figures of those who defect as of those who cooperate")
-        return self
-
-
 def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
-    """Draw each claim `dilemma` that was tried into a folder, as PNG and SVG.
+    """Draw each claim `dilemma` that was tried into a folder, as PNG and SVG, and write their figures beside them.
 
     Args:
         checked: of each scenario what `socialai check --json` prints.
@@ -72,9 +40,11 @@ def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Pa
     Returns:
         The pictures.
     """
-    drawn = []
+    drawn: list[Path] = []
+    kept: list[dict[str, Any]] = []
     for report in checked:
         found = [one["schelling"] for one in report.get("properties", ()) if "schelling" in one]
+        kept += [{"scenario": report["scenario"], "schelling": figures} for figures in found]
         for number, figures in enumerate(found, start=1):
             folder.mkdir(parents=True, exist_ok=True)
             figure = dilemma_figure(report["scenario"], SchellingRecord.model_validate(figures))
@@ -84,6 +54,8 @@ def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Pa
             for form in ("png", "svg"):
                 drawn.append(folder / f"{name}.{form}")
                 drawn[-1].write_bytes(saved(figure, form))
+    if kept:
+        write_json(folder / DILEMMAS, {"dilemmas": kept})
     return drawn
 
 

@@ -34,6 +34,7 @@ from socialai_dsl.reporting.crossplay import matrix_size
 from socialai_dsl.reporting.published import MARGIN
 from socialai_dsl.reporting.records import (
     CrossPlayRecord,
+    DilemmaRecord,
     Figures,
     PartFigures,
     Rate,
@@ -99,6 +100,10 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         ],
         words=[
             _words(f"words{number}", found) for number, found in enumerate(analysis.experiment.words, start=1)
+        ],
+        dilemmas=[
+            _dilemma(f"dilemma{number}", found)
+            for number, found in enumerate(analysis.experiment.dilemmas, start=1)
         ],
         endings=[one for section in sections for one in section["endings"]],
         baselines=_baselines(analysis.baselines),
@@ -212,7 +217,11 @@ def _lead(analysis: Analysis) -> str:
 
 def _of_several(analysis: Analysis) -> str:
     """What there is of several players, in a sentence each."""
-    kinds = (("Cross-play", analysis.experiment.crossplays), ("Words", analysis.experiment.words))
+    kinds = (
+        ("Cross-play", analysis.experiment.crossplays),
+        ("Words", analysis.experiment.words),
+        ("Dilemmas", analysis.experiment.dilemmas),
+    )
     return " ".join(
         f"{kind} of {', '.join(scenario_name(one.scenario) for one in found)}."
         for kind, found in kinds
@@ -517,6 +526,25 @@ def _crossplay(anchor: str, found: CrossPlayRecord) -> dict[str, Any]:
                 },
             }
             for cells in zip(*(found.seats[seats[0]].cells for _, seats in groups), strict=True)
+        ],
+    }
+
+
+def _dilemma(anchor: str, found: DilemmaRecord) -> dict[str, Any]:
+    """What those who cooperate and those who defect are paid, by how many others cooperate."""
+    figures = found.schelling
+    paid = zip(figures.cooperators, figures.defectors, strict=True)
+    return {
+        "anchor": anchor,
+        "title": f"Dilemma: {scenario_name(found.scenario)}",
+        "verdict": figures.verdict,
+        "rows": [
+            {
+                "others who cooperate": str(others),
+                f"those who cooperate ({figures.frames[0]})": f"{together:.3f}",
+                f"those who defect ({figures.frames[1]})": f"{alone:.3f}",
+            }
+            for others, (together, alone) in enumerate(paid)
         ],
     }
 

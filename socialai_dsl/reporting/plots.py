@@ -19,6 +19,7 @@ from socialai_dsl.baselines import Baselines
 from socialai_dsl.reporting.analysis import Analysis, Section, Summary
 from socialai_dsl.reporting.crossplay import matrix_figure
 from socialai_dsl.reporting.curve import draw_outcomes
+from socialai_dsl.reporting.dilemma import dilemma_figure
 from socialai_dsl.reporting.seeds import Seeds
 from socialai_dsl.reporting.style import (
     INK,
@@ -48,7 +49,7 @@ _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 
 def figures(analysis: Analysis) -> dict[str, Figure]:
     """Name -> figure: for each part of the report its success, curves, endings and interquartile means; for each
-    cross-play its matrices.
+    cross-play its matrices, for each dilemma its diagram.
     """
     with styled():
         found = {
@@ -59,6 +60,8 @@ def figures(analysis: Analysis) -> dict[str, Figure]:
         for number, crossplay in enumerate(analysis.experiment.crossplays, start=1):
             for place, seats in enumerate(crossplay.alike, start=1):
                 found[f"crossplay{number}-{place}"] = matrix_figure(crossplay, seats)
+        for number, dilemma in enumerate(analysis.experiment.dilemmas, start=1):
+            found[f"dilemma{number}"] = dilemma_figure(dilemma.scenario, dilemma.schelling)
     return found
 
 

@@ -211,6 +211,51 @@ class CrossPlayRecord(Record):
         return [tuple(group) for group in groups]
 
 
+class SchellingRecord(Record):
+    """The figures of a claim `dilemma`, as `socialai check --json` prints them.
+
+    Attributes:
+        frames: of those who cooperate, and of those who defect.
+        cooperators, defectors: mean of what they are paid in an episode, while 0, 1, ... of the others cooperate.
+        cooperators_se, defectors_se: standard errors of these means over rooms.
+        verdict: whether it is a dilemma, and why.
+    """
+
+    frames: tuple[str, str]
+    cooperators: list[float] = Field(min_length=2)
+    defectors: list[float]
+    cooperators_se: list[float]
+    defectors_se: list[float]
+    verdict: str
+
+    @model_validator(mode="after")
+    def _as_many_of_each(self) -> Self:
+        if (
+            len(
+                {
+                    len(means)
+                    for means in (self.cooperators, self.defectors, self.cooperators_se, self.defectors_se)
+                }
+            )
+            > 1
+        ):
+            raise ValueError("expected as many figures of those who defect as of those who cooperate")
+        return self
+
+
+class DilemmaRecord(Record):
+    """The figures of a claim `dilemma` of a scenario."""
+
+    scenario: str
+    schelling: SchellingRecord
+
+
+class DilemmasRecord(Record):
+    """`dilemmas.json`: the claims that `socialai check --pictures` has drawn."""
+
+    dilemmas: list[DilemmaRecord] = Field(min_length=1)
+
+
 class ToldRecord(Record):
     """How much messages tell of a situation, in bits; see `evaluation.information.Information`."""
 

@@ -11,7 +11,8 @@ import yaml
 from socialai_dsl.analysis.dilemma import Schelling, schelling
 from socialai_dsl.cli.main import main
 from socialai_dsl.frontend import check, load
-from socialai_dsl.reporting.dilemma import SchellingRecord, dilemma_figure
+from socialai_dsl.reporting.dilemma import dilemma_figure
+from socialai_dsl.reporting.records import SchellingRecord
 from tests.tiny import Folder
 
 GIFT = """
@@ -97,6 +98,7 @@ def test_the_diagram_is_drawn_for_all_numbers_of_seats(
     assert found["defectors"] == pytest.approx([0.3 * others for others in range(seats)])
     assert max(found["cooperators_se"]) < 1e-9, "rooms pay alike"
     assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == [
+        "dilemmas.json",
         "gift_dilemma.png",
         "gift_dilemma.svg",
     ]
