@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.analysis.effort import EPISODES, Effort
+from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.arguments import (
     add_effort,
     episodes,
@@ -19,6 +20,7 @@ from socialai_dsl.cli.arguments import (
 )
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine, json_text
+from socialai_dsl.runs.folder import DILEMMAS
 from socialai_dsl.runs.report import require_libraries
 
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
@@ -127,9 +129,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def _draw(documents: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    from socialai_dsl.reporting.dilemma import draw_dilemmas  # it loads Matplotlib
+    from socialai_dsl.reporting.dilemma import dilemmas_of, draw_dilemmas  # it loads Matplotlib
 
     drawn = draw_dilemmas(documents, folder)
+    if drawn:
+        write_json(folder / DILEMMAS, dilemmas_of(documents))
     for file in drawn:
         print(f"written to {file}", file=sys.stderr)
     if not drawn:

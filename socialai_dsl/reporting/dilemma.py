@@ -10,7 +10,6 @@ from typing import Any, Final
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from socialai_dsl.atomic import write_json
 from socialai_dsl.reporting.records import SchellingRecord
 from socialai_dsl.reporting.style import (
     INK,
@@ -23,15 +22,27 @@ from socialai_dsl.reporting.style import (
     shown,
     styled,
 )
-from socialai_dsl.runs.folder import DILEMMAS, scenario_folder_name
+from socialai_dsl.runs.folder import scenario_folder_name
 
 _CHARACTERS: Final = 74  # of a line below the figure
 _NO_ERROR: Final = 1e-9
 """A standard error below this is none."""
 
 
+def dilemmas_of(checked: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The figures of each claim `dilemma` that was tried, as a report takes them."""
+    return {
+        "dilemmas": [
+            {"scenario": report["scenario"], "schelling": one["schelling"]}
+            for report in checked
+            for one in report.get("properties", ())
+            if "schelling" in one
+        ]
+    }
+
+
 def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
-    """Draw each claim `dilemma` that was tried into a folder, as PNG and SVG, and write their figures beside them.
+    """Draw each claim `dilemma` that was tried into a folder, as PNG and SVG.
 
     Args:
         checked: of each scenario what `socialai check --json` prints.
@@ -41,10 +52,8 @@ def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Pa
         The pictures.
     """
     drawn: list[Path] = []
-    kept: list[dict[str, Any]] = []
     for report in checked:
         found = [one["schelling"] for one in report.get("properties", ()) if "schelling" in one]
-        kept += [{"scenario": report["scenario"], "schelling": figures} for figures in found]
         for number, figures in enumerate(found, start=1):
             folder.mkdir(parents=True, exist_ok=True)
             figure = dilemma_figure(report["scenario"], SchellingRecord.model_validate(figures))
@@ -54,8 +63,6 @@ def draw_dilemmas(checked: Sequence[Mapping[str, Any]], folder: Path) -> list[Pa
             for form in ("png", "svg"):
                 drawn.append(folder / f"{name}.{form}")
                 drawn[-1].write_bytes(saved(figure, form))
-    if kept:
-        write_json(folder / DILEMMAS, {"dilemmas": kept})
     return drawn
 
 
