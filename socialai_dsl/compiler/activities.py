@@ -55,6 +55,7 @@ class Activities:
     ) -> None:
         self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
         self.aim = aim
+        self._absent = Label()  # where to go if what it is about is not in the room
         self.turn = to.sites.row(f"cast.{label(checked.entities[entity])}.turn")
 
     def emit(self, activity: Activity, acting: bool = True) -> None:
@@ -65,13 +66,11 @@ class Activities:
         to, block = self.to, self.to.block
         to.site, block.span = activity.site, activity.span
         nothing, absent, done = Label(), Label(), Label()
+        self._absent = absent
         to.failed = nothing
-        if activity.until is not None and self.aim is not None:
-            self._aimed_at(activity)
-            to.failed = absent  # what is found and not in the room is an aim all the same
         if acting:
             self._emit(activity)
-        elif activity.until is None:
+        else:
             self._note_aim(activity)
         to.failed = None
         if nothing.uses or absent.uses:
@@ -88,7 +87,7 @@ class Activities:
         to, block = self.to, self.to.block
         own, done = constant(self.entity), Label()
         if ACTIVITIES[activity.name].act is None:
-            self._aimed_at(activity)
+            self._aim_at(activity.args[0])
             return
         if ACTIVITIES[activity.name].of_hands:
             self._use_hands(activity, acting=False)
@@ -116,13 +115,13 @@ class Activities:
             case "face":
                 self._face(to.value(activity.args[0]))
             case "turn_to":
-                block.emit(Op.TURN_TO, own, self._aimed_at(activity), self.turn)
+                block.emit(Op.TURN_TO, own, self._aim_at(activity.args[0]), self.turn)
             case "turn":
                 self._turn(activity.args[0])
             case "go_to":
-                block.emit(Op.GO_TO, own, self._aimed_at(activity), self.turn)
+                block.emit(Op.GO_TO, own, self._aim_at(activity.args[0]), self.turn)
             case "go_next_to":
-                block.emit(Op.GO_NEXT_TO, own, self._aimed_at(activity), self.turn)
+                block.emit(Op.GO_NEXT_TO, own, self._aim_at(activity.args[0]), self.turn)
             case "use":
                 self._note(GETTING_THERE)
                 self._use(to.value(activity.args[0]), noting=True)
@@ -154,24 +153,22 @@ class Activities:
                 self._choose(activity)
 
     def _present(self, goal: Term) -> int:
-        """What the activity is about; if it is not in the room, there is nothing to be done."""
+        """What the activity is about; if it is not in the room, it is an aim all the same, and nothing is done."""
         to = self.to
-        entity = to.value(goal)
+        entity = self._aim_at(goal)
         if goal.type.kind == "entity":
-            assert to.failed is not None, "internal: an activity can always come to nothing"
             gone = to.value(FieldOf(BOOL, goal, "gone"))
-            to.block.test(Op.IF_EQ, gone, constant(0), to.failed)
+            to.block.test(Op.IF_EQ, gone, constant(0), self._absent)
         elif isinstance(goal, CellOf | Read):
-            assert to.failed is not None, "internal: an activity can always come to nothing"
-            to.block.test(Op.IF_NE, entity, constant(NOWHERE), to.failed)
+            to.block.test(Op.IF_NE, entity, constant(NOWHERE), self._absent)
         return entity
 
-    def _aimed_at(self, activity: Activity) -> int:
+    def _aim_at(self, goal: Term) -> int:
         """What the activity is about, noted if its end asks for it."""
-        goal = self.to.value(activity.args[0])
+        found = self.to.value(goal)
         if self.aim is not None:
-            self.to.block.emit(Op.LOAD, self.aim, goal)
-        return goal
+            self.to.block.emit(Op.LOAD, self.aim, found)
+        return found
 
     def _face(self, goal: int) -> None:
         self.to.block.emit(Op.FACE, constant(self.entity), goal, self.turn)
@@ -289,7 +286,7 @@ class Activities:
     def _enter(self, activity: Activity) -> None:
         """Use it while it cannot be walked on, then go there; a member that is there stays."""
         block = self.to.block
-        entity = self._aimed_at(activity)
+        entity = self._aim_at(activity.args[0])
         shut, done = Label(), Label()
         with block.when(Op.IF_SAME_CELL, constant(self.entity), entity, then=done):
             block.emit(Op.BODY, constant(Body.NONE))

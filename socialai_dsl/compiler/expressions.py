@@ -15,6 +15,7 @@ from socialai_dsl.compiler.assembler import (
     entity_register,
     found_path,
     said_path,
+    seat_path,
     state_names,
 )
 from socialai_dsl.compiler.cells import (
@@ -35,7 +36,7 @@ from socialai_dsl.compiler.cells import (
 from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole
 from socialai_dsl.compiler.rows import row
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.program import Field, Op, Register, constant, is_temporary
+from socialai_dsl.program import Field, Op, Register, SeatRegister, constant, is_temporary
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
@@ -508,8 +509,11 @@ class Lines:
         """Emit that `speaker` says a line, whose number is in an operand."""
         self._speak(to, speaker, line, _number_of((*_before(speaker), *said.parts), speaker, said))
 
-    def _speak(self, to: Expressions, speaker: Entity, line: int, of: int) -> None:
-        """Emit that `speaker` says one of so many lines in its present tone; note it if a condition reads it."""
+    def _speak(self, to: Expressions, speaker: Entity, line: int, of: int, as_player: bool = False) -> None:
+        """Emit that `speaker` says one of so many lines in its present tone; note it if a condition reads it.
+
+        What a script says while somebody has the seat is not noted: the player speaks then (`as_player`).
+        """
         block = to.block
         if speaker.tone is not None:
             tone = to.into_temporary(Op.MUL, to.value(speaker.tone), constant(of))
@@ -518,8 +522,14 @@ class Lines:
         noted = to.registers.by_path.get(said_path(speaker))
         if noted is None:
             return
-        with block.scratch(), block.when(Op.IF_EQ, noted, constant(0)):
+        unnoted = Label()
+        block.test(Op.IF_EQ, noted, constant(0), unnoted)
+        taken = to.registers.by_path.get(seat_path(speaker, SeatRegister.TAKEN))
+        if taken is not None and not as_player:
+            block.test(Op.IF_EQ, taken, constant(0), unnoted)
+        with block.scratch():
             block.emit(Op.LOAD, noted, to.into_temporary(Op.ADD, line, constant(1)))
+        block.bind(unnoted)
 
     def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
         """Emit the number of the line that `speaker` says, in its first tone; the operand it is in."""
@@ -533,8 +543,8 @@ class Lines:
             return self._said_to(to, [*varying, line.to.term], line.to, first)
         return self._index(to, varying, first)
 
-    def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
-        """Emit that `speaker` says an utterance of the grammar as part of a sequence; 0 is silence."""
+    def perform(self, to: Expressions, speaker: Entity, utterance: Term, as_player: bool = False) -> None:
+        """Emit that `speaker` says an utterance of the grammar, in a sequence or for its player; 0 is silence."""
         if isinstance(utterance, Const) and utterance.value == 0:
             return
         block = to.block
@@ -544,7 +554,8 @@ class Lines:
             block.test(Op.IF_NE, said, constant(0), silent)
             said = to.into_temporary(Op.MAX, said, constant(1))
         line = self._line_performed(to, speaker, said)
-        self._speak(to, speaker, line, _number_of((*_before(speaker),), speaker) * len(self.grammar))
+        of = _number_of((*_before(speaker),), speaker) * len(self.grammar)
+        self._speak(to, speaker, line, of, as_player)
         block.bind(silent)
 
     def _line_performed(self, to: Expressions, speaker: Entity, said: int) -> int:

@@ -736,7 +736,7 @@ def seat_code(allocation: Allocation, number: int) -> int:
     to = allocation.expressions()
     speaker = allocation.checked.entities[number]
     said = Read(Type("int", 0, len(allocation.lines.grammar)), seat_path(speaker, SeatRegister.UTTERANCE))
-    allocation.lines.perform(to, speaker, said)
+    allocation.lines.perform(to, speaker, said, as_player=True)
     to.block.halt()
     return allocation.code.add(to.block, f"{label(speaker)}.seat")
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.compiler.assembler import said_path, seat_path, state_names
+from socialai_dsl.compiler.assembler import seat_path, state_names
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.instruction_checks import (
     PathFacts,
@@ -218,7 +218,6 @@ def _seat_row(allocation: Allocation, number: int, says: int, heard: int, log: i
         SeatColumn.HEARD: heard,
         SeatColumn.LOG: log,
         SeatColumn.SAYS: says,
-        SeatColumn.SAID: by_path.get(said_path(member), 0),
     }
     return _in_columns(SeatColumn, row)
 
@@ -745,9 +744,6 @@ def _seats(program: Program) -> None:
             first + which for which in (*wanted, SeatRegister.BONUS)
         }
         _require(free.isdisjoint(ranges), "a named register lies in a seat")
-        _require(
-            row[SeatColumn.SAID] == 0 or row[SeatColumn.SAID] in ranges, "a seat notes what it says nowhere"
-        )
 
 
 def _lines(program: Program) -> None:

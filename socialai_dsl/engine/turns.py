@@ -321,8 +321,6 @@ def _accompany(row: Row, frame: int, npc: int, seat: int, flags: int) -> None:
     stay_outline()
     registers = row.registers
     pointing = field(row, npc, Field.POINTING)
-    noted = seat_word(row, seat, SeatColumn.SAID)
-    said = registers[noted]
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
     perceive(row, frame, flags)
     chosen = notice(row, row.program[state_table(row, frame) + 1 + heard])
@@ -334,8 +332,6 @@ def _accompany(row: Row, frame: int, npc: int, seat: int, flags: int) -> None:
         registers[seat_register(row, seat, SeatRegister.WISH)] = wish
         registers[seat_register(row, seat, SeatRegister.WISH_LINE)] = registers[Register.SAID_LINE]
     registers[Register.SAID_LINE] = 0
-    if noted != 0:
-        registers[noted] = said
 
 
 @merged

@@ -253,8 +253,7 @@ class SeatColumn(IntEnum):
     HEARD = 2  # first register of the lines it heard this step, as at Header.HEARD
     LOG = 3  # first register of its log, as at Header.LOG
     SAYS = 4  # code that says the line of SeatRegister.UTTERANCE
-    SAID = 5  # register of what its member said in this step; 0: nobody asks
-    COLUMNS = 6
+    COLUMNS = 5
 
 
 class SeatRegister(IntEnum):
