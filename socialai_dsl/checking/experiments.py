@@ -103,16 +103,15 @@ def from_anywhere(name: str, folder: Path) -> str:
     """
     base = name.partition("?")[0]
     called = base.partition("+")[0]
-    if not _stands_in(folder, called) and (
-        not looks_like_path(called) or _stands_in(shipped_folder(), called)
-    ):
+    ships = not looks_like_path(called) or _is_in(shipped_folder(), called)
+    if called in shipped_names() or (ships and not _is_in(folder, called)):
         return name
     return os.path.abspath(folder / base) + name[len(base) :]
 
 
-def _stands_in(folder: Path, name: str) -> bool:
-    """Whether a file of this name, or with the suffix, is in a folder, and nothing ships under the name alone."""
-    return name not in shipped_names() and any((folder / f"{name}{end}").is_file() for end in ("", ".yaml"))
+def _is_in(folder: Path, name: str) -> bool:
+    """Whether a folder has a file of this name, with or without the suffix."""
+    return any((folder / f"{name}{end}").is_file() for end in ("", ".yaml"))
 
 
 def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperiment | None:

@@ -113,7 +113,9 @@ class Seats:
 
 def _own_of(filled: Mapping[str, tuple[Any, ...]], names: Sequence[str]) -> tuple[int, ...]:
     """The caller's seats: those that are said to be, else the first that nobody fills. Raises ValueError for none."""
-    said = tuple(n for n, name in enumerate(names) if filled.get(name) == (CALLER,))
+    said = tuple(
+        n for n, name in enumerate(names) if [_is(p, CALLER) for p in filled.get(name, ())] == [True]
+    )
     free = tuple(n for n, name in enumerate(names) if name not in filled)
     if not said and not free:
         raise ValueError(f"seats: got {', '.join(names)} filled; expected one left for the actions of `step`")
@@ -213,7 +215,7 @@ class Company:
     def begin(self, begun: NDArray[np.bool_]) -> None:
         """Episodes have begun in some games, bool (E,)."""
         for _, games, player in self._filled():
-            if not isinstance(player, str):
+            if not isinstance(player, str) and begun[games].any():
                 player.reset(begun[games])
 
     def act(self, own: NDArray[Any]) -> NDArray[np.int64]:
@@ -224,7 +226,7 @@ class Company:
         actions[:, list(seats.own)] = own.reshape(table.rows, len(seats.own), -1)
         for number, games, player in self._filled():
             if _is(player, RANDOM):
-                actions[games, number] = self._drawn(number)[games]
+                actions[games, number] = self._drawn(number, games)
             elif _is(player, NOBODY):
                 actions[games, number, 0] = self._sizes[0] - np.uint64(1)  # no movement
             elif _is(player, SCRIPT) and number == 0:
@@ -234,10 +236,10 @@ class Company:
                 actions[games, number] = player.act({"image": image.copy(), "tokens": tokens.copy()})
         return actions.reshape(table.players, -1)
 
-    def _drawn(self, number: int) -> NDArray[np.int64]:
-        """Actions drawn uniformly, int64 (E, heads), by the key of the episode and the step."""
-        keys = self._table.state.keys[:, Key.KEY, None]
-        step = self._table.state.registers[:, Register.T, None].astype(np.uint64) + np.uint64(1)
+    def _drawn(self, number: int, games: slice) -> NDArray[np.int64]:
+        """Actions of a seat in G games, drawn uniformly, int64 (G, heads), by the key of the episode and the step."""
+        keys = self._table.state.keys[games, Key.KEY, None]
+        step = self._table.state.registers[games, Register.T, None].astype(np.uint64) + np.uint64(1)
         head = np.arange(len(self._sizes), dtype=np.uint64)
         word = self._sites[number] << np.uint64(32) | step << np.uint64(16) | head
         bits = _mixed(keys + word * np.uint64(draws.GOLDEN))

@@ -93,10 +93,15 @@ def called(player: Player) -> str:
     return SCRIPT if player.is_script else player.agent
 
 
+def meant_by(word: str) -> Player:
+    """The player that is called so on a seat, without looking for it."""
+    return Player(_WORDS.get(word, word))
+
+
 def _meant(name: str | Player, scenario: str) -> Player:
     if isinstance(name, Player):
         return name
-    return Player(_WORDS[name] if name in _WORDS else named_agent(name, scenario))
+    return meant_by(name) if name in _WORDS else Player(named_agent(name, scenario))
 
 
 def _matches(name: str) -> list[str]:
@@ -113,21 +118,7 @@ def seats_with(pools: Mapping[Seat, Sequence[Player]], program: Playable) -> dic
     Raises:
         UsageError: a player has no script, does not fit, or is none that can be asked here.
     """
-    env = make(program)
-    try:
-        filled: dict[Seat, Any] = {
-            seat: [
-                _filling(replace(player, seed=player.seed + (place << 32)), seat, program, env)
-                for place, player in enumerate(players)
-            ]
-            for seat, players in pools.items()
-        }
-    except UsageError:
-        raise
-    except ValueError as error:
-        raise UsageError(str(error)) from error
-    finally:
-        env.close()
+    filled = _filled(pools, program)
     return {seat: filled.get(seat, CALLER) for seat in seats_of(program)}
 
 
@@ -158,7 +149,7 @@ def seating(
         return loaded, None
     if AGENT in partners and partners[AGENT].follows_frame:
         loaded = with_frame_of(partners[AGENT], scenario, loaded, texts).loaded
-    return loaded, _filled(partners, compiled(loaded))
+    return loaded, _one_each(partners, compiled(loaded))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +172,7 @@ class Beside:
         Raises:
             UsageError: see `seating`.
         """
-        return _filled(self.partners, self.program) if self.partners else None
+        return _one_each(self.partners, self.program) if self.partners else None
 
 
 def beside(named: Named, scenario: str) -> Beside:
@@ -201,11 +192,23 @@ def beside(named: Named, scenario: str) -> Beside:
     return Beside(played, compiled(played), partners)
 
 
-def _filled(partners: Partners, program: Playable) -> dict[Seat, str | Policy]:
+def _one_each(partners: Partners, program: Playable) -> dict[Seat, str | Policy]:
     """What fills the seats of partners in an environment of a program. Raises UsageError as `seating` does."""
+    filled = _filled({seat: [player] for seat, player in partners.items()}, program)
+    return {seat: one for seat, [one] in filled.items()}
+
+
+def _filled(pools: Mapping[Seat, Sequence[Player]], program: Playable) -> dict[Seat, list[str | Policy]]:
+    """What fills seats on which players take turns; what one draws must not tell another anything."""
     env = make(program)
     try:
-        return {seat: _filling(player, seat, program, env) for seat, player in partners.items()}
+        return {
+            seat: [
+                _filling(replace(player, seed=player.seed + (place << 32)), seat, program, env)
+                for place, player in enumerate(players)
+            ]
+            for seat, players in pools.items()
+        }
     except UsageError:
         raise
     except ValueError as error:
@@ -358,8 +361,8 @@ def sitting(program: Playable, partners: Partners, own: Seat) -> dict[Seat, str]
 
     def word(seat: Seat) -> str:
         if seat not in partners:
-            return SCRIPT if has_script(program, seat) else "nobody"
-        return SCRIPT if partners[seat].is_script else short_name(partners[seat].agent)
+            return SCRIPT if has_script(program, seat) else NOBODY
+        return short_name(called(partners[seat]))
 
     return {seat: word(seat) for seat in seats_of(program) if seat != own}
 

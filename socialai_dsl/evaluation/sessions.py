@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.atomic import read_json
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.seats import SCRIPT
+from socialai_dsl.episodes.partners import sitting
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.episodes.players import Agent, Player
 from socialai_dsl.episodes.results import EvalResult
@@ -20,7 +21,7 @@ from socialai_dsl.evaluation.crossplay import Recording
 from socialai_dsl.evaluation.test_set import evaluation_of_person
 from socialai_dsl.frontend import load
 from socialai_dsl.play.journal import FILE
-from socialai_dsl.program_suite import Playable, has_script, seats_of
+from socialai_dsl.program_suite import Playable, seats_of
 from socialai_dsl.runs.folder import CONFIG, agent_of, scenario_folder_name
 
 
@@ -90,8 +91,7 @@ def _recording(
 def _beside(folder: Path, program: Playable, own: str) -> dict[str, str]:
     """Who sat on each other seat, as the configuration of the evaluation names them."""
     named: Mapping[str, Sequence[str]] = read_json(folder / CONFIG).get("seats", {})
-    scripts = {seat: SCRIPT if has_script(program, seat) else "nobody" for seat in seats_of(program)}
-    return {seat: named.get(seat, [word])[0] for seat, word in scripts.items() if seat != own}
+    return {seat: named.get(seat, [word])[0] for seat, word in sitting(program, {}, own).items()}
 
 
 def _sat(player: Player, name: str, folder: Path) -> bool:

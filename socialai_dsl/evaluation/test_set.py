@@ -14,13 +14,13 @@ from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.scenario_env import ScenarioEnv
-from socialai_dsl.envs.seats import NOBODY, SCRIPT
 from socialai_dsl.envs.told_apart import of_test_episodes
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.partners import (
     Company,
     Partners,
     company,
+    meant_by,
     own_seat,
     replayed_seats,
     sitting,
@@ -35,7 +35,7 @@ from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_mo
 from socialai_dsl.evaluation.people import play_test_episodes
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
-from socialai_dsl.program_suite import Playable, ProgramSuite, has_script, prefixed, seats_of
+from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed, seats_of
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
@@ -344,11 +344,7 @@ def trace_test_episodes(
 
 def _with_idle(partners: Partners, own: Seat, program: Playable) -> Partners:
     """Who has all seats but the own one, where nobody was named their scripts."""
-    return {
-        seat: partners.get(seat) or Player("oracle" if has_script(program, seat) else NOBODY)
-        for seat in seats_of(program)
-        if seat != own
-    }
+    return {seat: partners.get(seat) or meant_by(word) for seat, word in sitting(program, {}, own).items()}
 
 
 def _playing(
@@ -370,13 +366,8 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
     loaded = load(scenario)
     program = compile_loaded(loaded)
     kept = episodes_of_models(run, program, most)
-    partners = {seat: _seated(word) for seat, word in kept.players.items() if seat != kept.own}
+    partners = {seat: meant_by(word) for seat, word in kept.players.items() if seat != kept.own}
     return _of_models(kept, scenario, loaded, program, Player(agent, out=run), partners)
-
-
-def _seated(word: str) -> Player:
-    """Who was meant by a word of `sitting`; it need not play again."""
-    return Player("oracle" if word == SCRIPT else word)
 
 
 def _of_models(
@@ -466,7 +457,7 @@ def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
         raise UsageError(f"{run}: holds no session of a person ({error})") from None
     if about.get("program_sha256") != program.sha256:
         raise UsageError(f"{run} holds episodes of another version of the scenario")
-    partners = {seat: _seated(word) for seat, word in about.get("seats", {}).items()}
+    partners = {seat: meant_by(word) for seat, word in about.get("seats", {}).items()}
     return _of_person(
         played[:most],
         scenario,

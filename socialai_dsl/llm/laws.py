@@ -25,7 +25,7 @@ def has(program: Program, flag: Flag) -> bool:
 
 
 def players(programs: Collection[Program], name: str | None) -> str:
-    """That there are several players, and which body is one's own; empty where there is one seat.
+    """That there are several players, and which body is one's own unless that is hidden; empty for one seat.
 
     Args:
         programs: that may be played.
@@ -34,7 +34,7 @@ def players(programs: Collection[Program], name: str | None) -> str:
     count = _seats(programs)
     if count == 1:
         return ""
-    named = "" if name is None else f"{printable(name)}, "
+    named = "" if name is None or _are_hidden(programs) else f"{printable(name)}, "
     return (
         f"You are {named}one of {_COUNTS[count - 1]} players, each with a body of its own: you move and speak with "
         "yours, and see and hear from where it stands. Once it is out of the room, you see nothing but walls."
@@ -88,10 +88,9 @@ def order(programs: Collection[Program], seat: str) -> str:
         begins = f"In a turn you move first{', then you are heard' if speaks else ''}"
     else:
         number = [str(entity) for entity in next(iter(programs)).seats].index(seat)
-        begins = (
-            f"In a turn the players move one after the other, you {_PLACES[number]}"
-            f"{', then they are heard in the same order' if speaks else ''}"
-        )
+        own = "" if _are_hidden(programs) else f", you {_PLACES[number]}"
+        heard = ", then they are heard in the same order" if speaks else ""
+        begins = f"In a turn the players move one after the other{own}{heard}"
     others = "then the others act one after the other"
     if before == {True}:
         return f"{begins}; you see this moment, {others}, and you hear what they say."
@@ -114,6 +113,11 @@ def is_pushed(program: Program, seat: str) -> bool:
 def body(program: Program, seat: str) -> int:
     """The number of the entity that the player of a seat has."""
     return [str(entity) for entity in program.entities].index(seat)
+
+
+def _are_hidden(programs: Collection[Program]) -> bool:
+    """Whether players are not to know which of them they are."""
+    return any(has(program, Flag.SEATS_HIDDEN) for program in programs)
 
 
 def _seats(programs: Collection[Program]) -> int:

@@ -10,7 +10,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -52,7 +52,13 @@ from socialai_dsl.runs.folder import (
 from trainer.config import HYPER, PARTNERS_FOLDER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
-Kept = TypeVar("Kept", bound=Record)
+
+_FIGURES: Final[Mapping[str, tuple[type[Record], str]]] = {
+    CROSSPLAY: (CrossPlayRecord, "socialai crossplay --out"),
+    WORDS: (WordsRecord, "socialai words --out"),
+    DILEMMAS: (DilemmasRecord, "socialai check --pictures"),
+}
+"""Files of figures besides those of runs: what they hold, and which command writes them."""
 
 _RESULT: Final = TypeAdapter(ResultRecord)
 _STATUS: Final = TypeAdapter(StatusRecord)
@@ -216,50 +222,33 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     return Experiment(names, "", "Runs that were given one by one.", "", tuple(conditions))
 
 
-def read_crossplay(path: Path) -> CrossPlayRecord | None:
-    """What `socialai crossplay --out` wrote into a folder or a file; None of a folder without it.
+def read_figures(path: Path) -> list[Record]:
+    """What `crossplay`, `words` and `check --pictures` wrote into a folder or a file; nothing of other folders.
 
     Raises:
         OSError: it cannot be read.
         UnreadableError: it is damaged, or something else.
     """
-    file = path / CROSSPLAY if path.is_dir() else path
-    if not file.exists() or file.name in (WORDS, DILEMMAS):
-        return None
-    return _figures(file, CrossPlayRecord, "socialai crossplay --out")
+    if path.is_dir():
+        return [_figures(path / name, name) for name in _FIGURES if (path / name).exists()]
+    return [_figures(path, path.name)] if path.exists() else []
 
 
-def read_words(path: Path) -> WordsRecord | None:
-    """What `socialai words --out` wrote into a folder or a file; None of a folder without it, and of other files.
-
-    Raises:
-        OSError: it cannot be read.
-        UnreadableError: it is damaged.
-    """
-    file = path / WORDS if path.is_dir() else path
-    if not file.exists() or file.name != WORDS:
-        return None
-    return _figures(file, WordsRecord, "socialai words --out")
+def with_figures(experiment: Experiment, figures: Sequence[Record]) -> Experiment:
+    """An experiment, beside which such figures are shown."""
+    return replace(
+        experiment,
+        crossplays=tuple(one for one in figures if isinstance(one, CrossPlayRecord)),
+        words=tuple(one for one in figures if isinstance(one, WordsRecord)),
+        dilemmas=tuple(one for all_ in figures if isinstance(all_, DilemmasRecord) for one in all_.dilemmas),
+    )
 
 
-def read_dilemmas(path: Path) -> DilemmasRecord | None:
-    """What `socialai check --pictures` wrote into a folder or a file; None of a folder without it, and of other files.
-
-    Raises:
-        OSError: it cannot be read.
-        UnreadableError: it is damaged.
-    """
-    file = path / DILEMMAS if path.is_dir() else path
-    if not file.exists() or file.name != DILEMMAS:
-        return None
-    return _figures(file, DilemmasRecord, "socialai check --pictures")
-
-
-def _figures(file: Path, record: type[Kept], command: str) -> Kept:
-    """The record that a command wrote into a file."""
+def _figures(file: Path, name: str) -> Record:
+    """The record that a file of this name holds; those of a cross-play may have another one."""
+    record, command = _FIGURES.get(name, _FIGURES[CROSSPLAY])
     try:
-        found: Kept = record.model_validate_json(file.read_bytes())
-        return found
+        return record.model_validate_json(file.read_bytes())
     except ValidationError as error:
         raise UnreadableError(f"{file}: expected what `{command}` writes; {described(error)}") from None
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -38,7 +37,7 @@ def report(
 
     Args:
         folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`;
-                besides, what `socialai crossplay --out`, `socialai words --out` and `socialai check --pictures` wrote.
+            besides, what `socialai crossplay --out`, `socialai words --out` and `socialai check --pictures` wrote.
         out: folder to write (default: `report` in the experiment's folder, or here for runs).
         baselines: whether script, chance and success without NPCs are measured; otherwise only what is known is shown.
         tell: takes a line before each scenario that is measured.
@@ -110,27 +109,16 @@ def require_libraries(*libraries: str) -> None:
 
 def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
     """What the folders hold, and where its report belongs."""
-    from socialai_dsl.reporting.collect import (
-        read_crossplay,
-        read_dilemmas,
-        read_experiment,
-        read_runs,
-        read_words,
-    )
+    from socialai_dsl.reporting.collect import read_experiment, read_figures, read_runs, with_figures
 
     try:
-        there = [folder for folder in folders if folder.exists()]
-        words = {folder: said for folder in there if (said := read_words(folder)) is not None}
-        played = {folder: pairs for folder in there if (pairs := read_crossplay(folder)) is not None}
-        claimed = {folder: found for folder in there if (found := read_dilemmas(folder)) is not None}
-        runs = [folder for folder in folders if folder not in {*played, *words, *claimed}]
+        figures = {folder: read_figures(folder) for folder in folders}
+        runs = [folder for folder in folders if not figures[folder]]
         if len(runs) == 1 and (runs[0] / EXPERIMENT).exists():
             experiment, place = read_experiment(runs[0]), runs[0]
         else:
             experiment, place = read_runs(runs), Path()
-        dilemmas = tuple(one for found in claimed.values() for one in found.dilemmas)
-        several = replace(experiment, crossplays=tuple(played.values()), words=tuple(words.values()))
-        return replace(several, dilemmas=dilemmas), place
+        return with_figures(experiment, [one for found in figures.values() for one in found]), place
     except ValueError as error:
         raise UsageError(str(error)) from error
 

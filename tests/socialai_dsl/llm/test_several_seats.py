@@ -423,3 +423,18 @@ def test_a_transcript_is_not_mixed_with_an_episode_that_goes_another_way(tmp_pat
             sd.evaluate("llm:stub", HELP, 2, **options)
     traces = sd.replay(tmp_path / "help_together", test_episodes=[0, 1])
     assert [len(trace.moments) - 1 for trace in traces] == found.result.lengths.tolist()
+
+
+def test_who_is_not_to_know_the_own_seat_is_not_told_it() -> None:
+    """As the pictures of hidden seats do not tell players apart, what is written does not either."""
+    shown, hidden = (
+        sd.compile(sd.load(f"together/turn_taking_together{variant}")) for variant in ("", "+alike")
+    )
+    names = {"agent": "Ann", "partner": "Bob"}
+    told = {
+        program.sha256: [TextView(program, seat=seat).explanation(name) for seat, name in names.items()]
+        for program in (shown, hidden)
+    }
+    assert len(set(told[shown.sha256])) == 2
+    assert len(set(told[hidden.sha256])) == 1
+    assert not any(name in told[hidden.sha256][0] for name in names.values())
