@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
+from pydantic import (
+    AliasChoices,
+    BaseModel,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
 
 from socialai_dsl.llm.actions import ToolCall
 
@@ -26,6 +33,10 @@ _STOPS: Final[dict[str, Stop]] = {
 }
 _MOST_TOKENS: Final = 10**12
 _LONGEST_REASON: Final = 80
+_EVENTS: Final = (b"data:", b"event:", b":")
+"""How a stream of events begins."""
+_DONE: Final = "[DONE]"
+"""The last event."""
 
 
 def _as_given(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
@@ -42,7 +53,7 @@ _Count = Annotated[int | None, Field(ge=0, le=_MOST_TOKENS), _Perhaps]
 
 
 class _Part(BaseModel):
-    """A part of a content: text, thoughts, a refusal, or something that is no text."""
+    """A part of a content: text, thoughts, a refusal (which is apart from what it says), or something else."""
 
     type: _Text = None
     text: _Text = None
@@ -55,20 +66,23 @@ class _Part(BaseModel):
             yield True, self.thinking
         for part in self.thinking if isinstance(self.thinking, list) else ():
             yield from ((True, text) for _, text in part.texts())
-        yield self.type in ("thinking", "reasoning"), self.text or self.refusal or ""
+        yield self.type in ("thinking", "reasoning"), self.text or ""
 
 
 class _Function(BaseModel):
     name: _Text = None
     arguments: Any = None
 
-    def call(self) -> ToolCall:
-        """The call, with its arguments as JSON: some servers send the object itself."""
-        given = self.arguments
-        return ToolCall(self.name or "", given if isinstance(given, str) else json.dumps(given or {}))
+    @property
+    def written(self) -> str:
+        """The arguments as JSON: some servers send the object itself."""
+        if self.arguments is None or isinstance(self.arguments, str):
+            return self.arguments or ""
+        return json.dumps(self.arguments)
 
 
 class _Call(BaseModel):
+    index: _Count = None
     function: Annotated[_Function | None, _Perhaps] = None
 
 
@@ -80,22 +94,34 @@ class _Message(BaseModel):
     tool_calls: Annotated[list[_Call] | None, _Perhaps] = None
     function_call: Annotated[_Function | None, _Perhaps] = None
 
+    @property
+    def parts(self) -> list[str | _Part]:
+        """Those of the content."""
+        return self.content if isinstance(self.content, list) else [self.content or ""]
+
     def texts(self) -> Iterator[tuple[bool, str]]:
         """Pieces of text, each with whether it is thought."""
         yield True, self.reasoning_content or self.reasoning or ""
-        content = self.content if isinstance(self.content, list) else [self.content or ""]
-        for part in content:
+        for part in self.parts:
             yield from [(False, part)] if isinstance(part, str) else part.texts()
 
-    def calls(self) -> tuple[ToolCall, ...]:
-        """The tools that it calls."""
-        functions = [call.function or _Function() for call in self.tool_calls or ()]
-        functions += [self.function_call] if self.function_call is not None and not functions else []
-        return tuple(function.call() for function in functions)
+    def refusals(self) -> Iterator[str]:
+        """Pieces of a refusal."""
+        yield self.refusal or ""
+        yield from (part.refusal or "" for part in self.parts if isinstance(part, _Part))
+
+    def functions(self) -> Iterator[tuple[int, _Function]]:
+        """Functions that are called, or further pieces of them, each with the number of its call."""
+        given = self.tool_calls or ([_Call(function=self.function_call)] if self.function_call else [])
+        numbers = {call.index for call in given}
+        for place, call in enumerate(given):
+            # Whole messages often number nothing, or give all calls the same number.
+            number = call.index if len(numbers) == len(given) else None
+            yield place if number is None else number, call.function or _Function()
 
 
 class _Choice(BaseModel):
-    message: _Message
+    message: _Message = Field(validation_alias=AliasChoices("message", "delta"))
     finish_reason: _Text = None
 
 
@@ -112,6 +138,13 @@ class _Usage(BaseModel):
 
 class _Completion(BaseModel):
     choices: list[_Choice] = Field(min_length=1)
+    usage: Annotated[_Usage | None, _Perhaps] = None
+
+
+class _Chunk(BaseModel):
+    """An event of a stream."""
+
+    choices: list[_Choice]
     usage: Annotated[_Usage | None, _Perhaps] = None
 
 
@@ -153,21 +186,53 @@ UNREADABLE: Final = Completion("", stop="unreadable")
 """A completion in which there is no message."""
 
 
+def looks_like_one(content: bytes) -> bool:
+    """Whether what a server sends begins like a completion, however it goes on."""
+    return content.lstrip().startswith((b"{", *_EVENTS))
+
+
 def read_completion(content: bytes) -> Completion | None:
-    """The completion that a server sent, `UNREADABLE` for one of another form; None if it is no completion at all."""
+    """The completion that a server sent, `UNREADABLE` for one of another form; None if it is no completion at all.
+
+    Some servers stream whatever they are asked: a stream that came to its end is put together.
+    """
+    if content.startswith(_EVENTS):
+        return _streamed(content)
     found = _json(content)
     try:
         completion = _Completion.model_validate(found)
     except ValidationError:
         return UNREADABLE if isinstance(found, dict) and "choices" in found else None
-    choice, usage = completion.choices[0], completion.usage or _Usage()
-    pieces = list(choice.message.texts())
+    choice = completion.choices[0]
+    return _made([choice.message], choice.finish_reason, completion.usage)
+
+
+def _streamed(content: bytes) -> Completion | None:
+    """The completion whose pieces are events; None if they are no pieces of one, or not all."""
+    lines = content.decode(errors="replace").splitlines()
+    data = [line.removeprefix("data:").strip() for line in lines if line.startswith("data:")]
+    try:
+        chunks = [_Chunk.model_validate(_json(event.encode())) for event in data if event != _DONE]
+    except ValidationError:
+        return None
+    choices = [choice for chunk in chunks for choice in chunk.choices[:1]]
+    reason = next((choice.finish_reason for choice in reversed(choices) if choice.finish_reason), None)
+    if reason is None and _DONE not in data:
+        return None
+    usage = next((chunk.usage for chunk in reversed(chunks) if chunk.usage), None)
+    return _made([choice.message for choice in choices], reason, usage)
+
+
+def _made(messages: list[_Message], finish_reason: str | None, usage: _Usage | None) -> Completion:
+    """A completion of a message, or of its pieces."""
+    usage = usage or _Usage()
+    pieces = [piece for message in messages for piece in message.texts()]
     text = "".join(piece for thought, piece in pieces if not thought)
-    calls = choice.message.calls()
-    refused = not text and not calls and choice.message.refusal
-    reason = (choice.finish_reason or "")[:_LONGEST_REASON]
+    calls = _calls(function for message in messages for function in message.functions())
+    refused = "" if text or calls else "".join(piece for one in messages for piece in one.refusals())
+    reason = (finish_reason or "")[:_LONGEST_REASON]
     return Completion(
-        choice.message.refusal or "" if refused else text,
+        refused or text,
         calls,
         "".join(piece for thought, piece in pieces if thought),
         _STOPS.get(reason.lower(), "refusal" if refused else ""),
@@ -177,6 +242,15 @@ def read_completion(content: bytes) -> Completion | None:
         (usage.completion_tokens_details or _Details()).reasoning_tokens,
         usage.cost,
     )
+
+
+def _calls(functions: Iterable[tuple[int, _Function]]) -> tuple[ToolCall, ...]:
+    """Calls of tools, from their pieces."""
+    calls: dict[int, ToolCall] = {}
+    for number, piece in functions:
+        begun = calls.get(number, ToolCall("", ""))
+        calls[number] = ToolCall(begun.name or piece.name or "", begun.arguments + piece.written)
+    return tuple(ToolCall(call.name, call.arguments or "{}") for call in calls.values())
 
 
 def read_error(content: bytes) -> tuple[str, str]:

@@ -17,7 +17,14 @@ import httpx
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.llm.actions import ToolCall
-from socialai_dsl.llm.completion import UNREADABLE, Completion, Stop, read_completion, read_error
+from socialai_dsl.llm.completion import (
+    UNREADABLE,
+    Completion,
+    Stop,
+    looks_like_one,
+    read_completion,
+    read_error,
+)
 
 OPENAI: Final = "https://api.openai.com/v1"
 Message = Mapping[str, Any]
@@ -241,7 +248,7 @@ class Endpoint:
 
 def _completion(content: bytes) -> Completion | None:
     """The completion that was sent; one that goes on beyond all measure was too long."""
-    if len(content) > _MOST_BYTES and content.lstrip()[:1] == b"{":
+    if len(content) > _MOST_BYTES and looks_like_one(content):
         return Completion("", stop="length")
     return read_completion(content)
 

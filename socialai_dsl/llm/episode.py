@@ -34,7 +34,7 @@ CONTEXT: Final = "context full"
 LEFT: Final = "left alone"
 CUT_SHORT: Final = {
     INVALID: "a reply without an action",
-    STOPPED: "a reply without an action, which the server cut off or held back",
+    STOPPED: "a reply without an action: cut off or held back by the server, or a refusal",
     CONTEXT: "a conversation longer than the model's context",
     LEFT: "a language model on another seat that ended so",
 }
@@ -43,8 +43,9 @@ _STOPS: Final = {
     "length": "the server cut your reply off, since it was too long, before it held an action",
     "content_filter": "a filter of the server held your reply back",
     "unreadable": "the server sent no reply",
+    "refusal": "you refused to reply",
 }
-"""What a model is told of replies that the server ended. Its own refusals are its own mistakes."""
+"""What a model is told of replies that ended before an action, which are no mistakes in what it writes."""
 
 TEST_SET: Final = 500
 """The episodes of the test set."""
@@ -81,7 +82,7 @@ class EpisodeResult:
         steps: number of steps played.
         replies: number of replies read.
         invalid: number of replies without an action that the model itself ended.
-        stopped: number of replies without an action that the server cut off or held back.
+        stopped: number of replies without an action that the server cut off or held back, or that it marks as refusals.
     """
 
     success: bool = False

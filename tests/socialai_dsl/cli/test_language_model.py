@@ -19,7 +19,7 @@ from socialai_dsl.llm import Episode, TextView
 from socialai_dsl.llm.episode import scripted_reply
 from socialai_dsl.runs.folder import scenario_folder_name
 from tests.quick import one_in
-from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
+from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly, stream
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
@@ -302,7 +302,7 @@ def test_answers_without_an_action_count_as_invalid(tmp_path: Path) -> None:
     with endpoint(lambda _: next(replies, "Act: done")) as stub:
         assert evaluate(stub.url, tmp_path, episodes=1) == 0
     result = figures(tmp_path)["eval"]
-    assert (result["replies"], result["invalid_replies"]) == (4, 3)
+    assert (result["replies"], result["invalid_replies"], result["stops"]) == (4, 2, {"refusal": 1})
     assert max(len(json.dumps(request)) for request in stub.requests) < 20_000
 
 
@@ -343,9 +343,9 @@ def test_replies_that_the_server_ends_count_apart(tmp_path: Path, capsys: Captur
     with endpoint(lambda _: next(replies, "Act: done")) as stub:
         assert evaluate(stub.url, tmp_path, episodes=1) == 0
     found = figures(tmp_path)["eval"]
-    assert (found["replies"], found["invalid_replies"], found["stopped_replies"]) == (6, 1, 3)
+    assert (found["replies"], found["invalid_replies"], found["stopped_replies"]) == (6, 0, 4)
     assert found["stops"] == {"content_filter": 2, "length": 2, "refusal": 1}
-    assert "content_filter 2, length 2, refusal 1; 3 of them without an action" in capsys.readouterr().out
+    assert "content_filter 2, length 2, refusal 1; 4 of them without an action" in capsys.readouterr().out
     first, second, *_ = transcript(tmp_path)
     assert (first["reasoning"], first["stop"], first["finish_reason"]) == (
         "Hm. Act: left",
@@ -354,6 +354,45 @@ def test_replies_that_the_server_ends_count_apart(tmp_path: Path, capsys: Captur
     )
     assert "the server cut your reply off" in second["observation"]
     assert "Hm." not in json.dumps(stub.requests[-1])
+
+
+def forever(piece: bytes) -> Any:
+    """Goes on until nobody listens."""
+    while True:
+        yield piece
+
+
+def test_a_server_that_streams_is_read_to_its_end(tmp_path: Path) -> None:
+    with endpoint(lambda _: stream("Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    found = figures(tmp_path)["eval"]
+    assert (found["replies"], found["prompt_tokens"], found["completion_tokens"]) == (1, 10, 2)
+
+
+ENDLESS = {
+    "events": stream("Act: ")[2].split(b"\n\n")[0] + b"\n\n",
+    "comments": b": ping\n\n" * 1000,
+    "blanks": b" " * 4096,
+    "HTML": b"<p>Please wait</p>" * 100,
+}
+
+
+@pytest.mark.parametrize("what", one_in(2, ENDLESS, "reads much"))
+def test_a_server_that_streams_for_ever_is_left(what: str, tmp_path: Path, capsys: Capture) -> None:
+    """What begins like a reply was too long; anything else is none, and nothing is lost by either."""
+    with endpoint(
+        lambda request: "Act: left" if len(request["messages"]) < 6 else (200, {}, forever(ENDLESS[what]))
+    ) as stub:
+        code = evaluate(stub.url, tmp_path, "--on-invalid", "fail", episodes=1)
+    if what in ("events", "comments"):
+        assert code == 0
+        assert figures(tmp_path)["eval"]["stops"] == {"length": 1}
+    else:
+        assert code == 2
+        said = capsys.readouterr().err
+        assert "the answer is no completion" in said
+        assert said.count("\n") == 1
+    assert [record["reply"] for record in transcript(tmp_path)][:2] == ["Act: left", "Act: left"]
 
 
 FULL = {

@@ -44,7 +44,12 @@ def calling(name: Any, arguments: Any) -> dict[str, Any]:
         (sent({"function_call": {"name": "move", "arguments": LEFT.arguments}}), Completion("", (LEFT,))),
         (sent({"content": "left", "tool_calls": 7}), Completion("left")),
         (sent({"content": None, "refusal": "No."}), Completion("No.", stop="refusal")),
-        (sent({"content": [{"type": "refusal", "refusal": "No."}]}), Completion("No.")),
+        (sent({"content": [{"type": "refusal", "refusal": "No."}]}), Completion("No.", stop="refusal")),
+        (sent({"content": [{"refusal": "No."}, {"text": "left"}]}), Completion("left")),
+        (
+            sent({"tool_calls": [{"index": 0, "function": LEFT._asdict()}, {"index": 0, "function": LEFT._asdict()}]}),
+            Completion("", (LEFT, LEFT)),
+        ),
         (
             sent({"content": "Act"}, finish_reason="length"),
             Completion("Act", stop="length", reason="length"),
@@ -70,6 +75,51 @@ def calling(name: Any, arguments: Any) -> dict[str, Any]:
     ],
 )  # fmt: skip
 def test_a_completion_is_read_as_servers_write_it(content: bytes, expected: Completion | None) -> None:
+    assert read_completion(content) == expected
+
+
+def events(*deltas: Any, reason: str | None = "stop", end: bytes = b"data: [DONE]\n\n") -> bytes:
+    """A stream with an event of each delta."""
+    chunks: list[Any] = [{"choices": [{"delta": delta}]} for delta in deltas]
+    chunks += [{"choices": [{"delta": {}, "finish_reason": reason}]}]
+    chunks += [{"choices": [], "usage": {"prompt_tokens": 3, "completion_tokens": 2}}]
+    return b"".join(b"data: " + json.dumps(chunk).encode() + b"\n\n" for chunk in chunks) + end
+
+
+def piece(index: int, **function: Any) -> dict[str, Any]:
+    return {"tool_calls": [{"index": index, "function": function}]}
+
+
+COUNTED: dict[str, Any] = {"reason": "stop", "prompt_tokens": 3, "completion_tokens": 2}
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (events({"content": ""}, {"content": "Act: "}, {"content": "left"}), Completion("Act: left", **COUNTED)),
+        (b": ping\n\n" + events({"content": "left"}, end=b""), Completion("left", **COUNTED)),
+        (b"event: message\r\n" + events({"content": [{"text": "left"}]}), Completion("left", **COUNTED)),
+        (
+            events({"reasoning_content": "Hm"}, {"reasoning": ", I"}, {"content": "left"}),
+            Completion("left", reasoning="Hm, I", **COUNTED),
+        ),
+        (events({"refusal": "No"}, {"refusal": "."}), Completion("No.", stop="refusal", **COUNTED)),
+        (
+            events({"content": "Act"}, reason="length"),
+            Completion("Act", stop="length", **{**COUNTED, "reason": "length"}),
+        ),
+        (
+            events(
+                piece(0, name="move", arguments='{"direction"'), piece(0, arguments=': "left"}'), piece(1, name="say")
+            ),
+            Completion("", (LEFT, ToolCall("say", "{}")), **COUNTED),
+        ),
+        *((text, None) for text in (b"data: [1]\n\n", b"data: Welcome", b":", b"event: x", b"data: {\n" * 9000)),
+        (events({"content": "lef"}, reason=None, end=b""), None),
+        (events({"content": 7}), None),
+    ],
+)  # fmt: skip
+def test_a_stream_that_nobody_asked_for_is_put_together(content: bytes, expected: Completion | None) -> None:
     assert read_completion(content) == expected
 
 

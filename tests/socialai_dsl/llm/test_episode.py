@@ -152,9 +152,9 @@ def test_what_the_server_ends_is_no_mistake_of_the_model(episode: Episode) -> No
     assert turn.text.startswith(
         "Your reply was not understood, and you did nothing: the server cut your reply off"
     )
-    episode.step("", stop="refusal")  # its own decision
+    episode.step("I cannot do that.", stop="refusal")
     result = episode.result()
-    assert (result.replies, result.invalid, result.stopped) == (3, 1, 1)
+    assert (result.replies, result.invalid, result.stopped) == (3, 0, 2)
     episode.end(CONTEXT)
     assert (episode.result().ending, episode.result().success) == (CONTEXT, False)
     with pytest.raises(ValueError, match="before the end of the episode"):
