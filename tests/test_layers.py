@@ -110,7 +110,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
     "llm": (
-        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "episodes", "render"},
+        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "episodes", "render", "traces"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
     "runs.options": (

@@ -27,6 +27,7 @@ from socialai_dsl.episodes.players import MODEL_PREFIX, Player
 from socialai_dsl.episodes.results import EvalResult
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
+from socialai_dsl.llm.prompting import PromptOptions
 from socialai_dsl.llm.questions import score
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.program_suite import Playable
@@ -152,7 +153,7 @@ def _model(
     Raises:
         UsageError, SettingsMismatchError: see `let_models_play`.
     """
-    from socialai_dsl.llm.players import LanguageModelPlayer, PromptOptions, transcripts
+    from socialai_dsl.llm.players import LanguageModelPlayer, transcripts
 
     options = player.options
     assert options is not None, "internal: a language model has options"

@@ -244,6 +244,11 @@ class TextSeat(Copied):
         self._result = replace(self._result, ending=ending)
 
     @property
+    def member(self) -> str | None:
+        """The member of a suite that is played; None of a scenario that plays alone."""
+        return self._member
+
+    @property
     def question(self) -> Question | None:
         """The probe that waits for an answer, between two steps or after the last; None without one.
 

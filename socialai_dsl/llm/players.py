@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import takewhile
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import httpx
 import numpy as np
@@ -31,7 +31,7 @@ from socialai_dsl.episodes.partners import Company
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, Step, TestEpisodes, at_once, play_async
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
 from socialai_dsl.episodes.results import Actions
-from socialai_dsl.llm.actions import Mode, ToolCall
+from socialai_dsl.llm.actions import ToolCall
 from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import (
     CONTEXT,
@@ -39,50 +39,22 @@ from socialai_dsl.llm.episode import (
     LEFT,
     Decision,
     EpisodeResult,
-    OnInvalid,
     TextSeat,
     Turn,
 )
-from socialai_dsl.llm.history import WHOLE, left_out
+from socialai_dsl.llm.history import left_out
+from socialai_dsl.llm.prompting import PromptOptions
 from socialai_dsl.llm.questions import AnsweredQuestion, constraints, put
 from socialai_dsl.llm.replies import readable
-from socialai_dsl.llm.view import Style, TextView
+from socialai_dsl.llm.view import TextView
 from socialai_dsl.program_suite import Playable
 
 FORMAT: Final = "socialai-transcript/2"
-Probing = Literal["apart", "kept", "off"]
 _SETTINGS: Final = "settings.json"
 _SESSION: Final = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
 """This process, in every reply that it writes down."""
 _SHOWN: Final = 4000
 """The most characters of a reply that the model is shown again, the last ones without its thoughts."""
-
-
-@dataclass(frozen=True)
-class PromptOptions:
-    """How a model plays.
-
-    Attributes:
-        style, mode, on_invalid: see `Episode`.
-        history: how many observations a request holds, the present one included; None: the whole episode.
-        grammar: whether replies are held to a grammar, which llama.cpp's server understands.
-        probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
-            kept like other messages, or not at all.
-        trials: how many episodes in a row are one conversation, in which the model is told how each ended.
-    """
-
-    style: Style = "prose"
-    mode: Mode = "text"
-    on_invalid: OnInvalid = "noop"
-    history: int | None = WHOLE
-    grammar: bool = False
-    probes: Probing = "apart"
-    trials: int = 1
-
-    @property
-    def of_episodes(self) -> dict[str, Any]:
-        """The arguments of `Episode` among them."""
-        return {name: getattr(self, name) for name in ("style", "mode", "on_invalid")}
 
 
 @dataclass(frozen=True)
@@ -638,9 +610,7 @@ class Conversation:
         self._usage = Usage()
         self._stops: Counter[str] = Counter()
         closing = "" if before is None else f"{before.closing}\n\n"
-        trial, trials = number % prompting.trials + 1, prompting.trials
-        heading = f"Episode {trial} of {trials} begins, in a room of its own.\n" if trials > 1 else ""
-        self._text = f"{closing}{heading}{text}"
+        self._text = f"{closing}{prompting.heading(number % prompting.trials)}{text}"
         self._exchanges: list[list[Mapping[str, Any]]] = [] if before is None else [*before.exchanges]
         self._replies: list[list[tuple[str, str]]] = [[]]
         self._records = _records(path)
@@ -682,12 +652,7 @@ class Conversation:
             {"role": "user", "content": text},
         ]
         first = {**shown[0], "content": f"{told}{shown[0]['content']}"}
-        instructions = self._seat.instructions
-        if self._prompting.trials > 1:
-            instructions += (
-                f"\n\nYou play {self._prompting.trials} episodes in a row, each in a room of its own, and are told how "
-                "each ended. What you find out in one may help you in the next."
-            )
+        instructions = self._prompting.told(self._seat.instructions)
         return [{"role": "system", "content": instructions}, first, *shown[1:]]
 
     def constraints(self) -> dict[str, Any]:

@@ -136,6 +136,9 @@ OPENENV = modules(
 @dataclass
 class Message:
     content: str
+    tool_calls: Any = None
+    tool_call_id: str = ""
+    function: str = ""
 
     @property
     def text(self) -> str:
@@ -157,17 +160,29 @@ class TaskState:
 
 
 class Model:
-    """Says what it was given, one reply after the other, and `Act: done` from then on; each with how it ended."""
+    """Says what it was given, one reply after the other, and `Act: done` from then on; each with how it ended.
 
-    def __init__(self, replies: Sequence[tuple[str, str]]) -> None:
+    A reply that is no text is a list of pairs: tools that are called, each with its arguments.
+    """
+
+    def __init__(self, replies: Sequence[tuple[Any, str]]) -> None:
         self.replies = iter(replies)
         self.asked: list[list[Message]] = []
+        self.events: list[dict[str, Any]] = []
 
-    async def generate(self, messages: list[Message]) -> Any:
+    async def generate(self, messages: list[Message], tools: Any, config: Any) -> Any:
         self.asked.append(messages)
-        text, reason = next(self.replies, ("Act: done", "stop"))
-        choices = [] if reason == "unknown" else [text]
-        return SimpleNamespace(message=Message(text), completion=text, stop_reason=reason, choices=choices)
+        said, reason = next(self.replies, ("Act: done", "stop"))
+        calls = None
+        if not isinstance(said, str):
+            calls = [SimpleNamespace(id="1", function=name, arguments=given) for name, given in said]
+        message = Message("" if calls else said, calls)
+        choices = [] if reason == "unknown" else [message]
+        return SimpleNamespace(message=message, stop_reason=reason, choices=choices)
+
+    def info(self, data: dict[str, Any], source: str) -> None:
+        """Note an event."""
+        self.events.append(data)
 
 
 def plain(*_: Any, **__: Any) -> Any:
@@ -175,19 +190,35 @@ def plain(*_: Any, **__: Any) -> Any:
     return lambda function: function
 
 
+def itself(function: Any) -> Any:
+    """A decorator without arguments that leaves a function as it is."""
+    return function
+
+
+def average(scores: Sequence[Any]) -> float:
+    """A metric."""
+    return sum(score.score.value for score in scores) / len(scores)
+
+
 def inspect_ai(model: Model) -> dict[str, ModuleType]:
     """The library with a model."""
     record = SimpleNamespace
-    kinds = ("ChatMessage", "ChatMessageAssistant", "ChatMessageSystem", "ChatMessageUser")
+    kinds = ("ChatMessage", "ChatMessageAssistant", "ChatMessageSystem", "ChatMessageTool", "ChatMessageUser")
     return modules(
-        inspect_ai={"Task": record, "task": lambda function: function},
+        inspect_ai={"Task": record, "task": itself},
         inspect_ai__dataset={"MemoryDataset": lambda samples, name: samples, "Sample": record},
-        inspect_ai__model={**dict.fromkeys(kinds, Message), "get_model": lambda: model},
+        inspect_ai__log={"transcript": lambda: model},
+        inspect_ai__model={
+            **dict.fromkeys(kinds, Message),
+            **{"GenerateConfig": record, "ModelOutput": Any, "ResponseSchema": record},
+            "get_model": lambda: model,
+        },
         inspect_ai__scorer={
-            **{"Score": record, "Scorer": Any, "Target": Any, "scorer": plain},
-            **{"mean": lambda: "mean", "stderr": lambda: "stderr"},
+            **{"Metric": Any, "SampleScore": Any, "Score": record, "Scorer": Any, "Target": Any},
+            **{"scorer": plain, "metric": itself, "grouped": plain, "stderr": lambda: "stderr"},
+            "mean": lambda: average,
         },
-        inspect_ai__solver={
-            **{"Generate": Any, "Solver": Any, "TaskState": TaskState, "solver": lambda function: function}
-        },
+        inspect_ai__solver={"Generate": Any, "Solver": Any, "TaskState": TaskState, "solver": itself},
+        inspect_ai__tool={"ToolInfo": record},
+        inspect_ai__util={"JSONSchema": record},
     )

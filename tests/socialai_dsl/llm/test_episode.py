@@ -13,6 +13,7 @@ from socialai_dsl.episodes.play import at_once
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.actions import Action
 from socialai_dsl.llm.episode import CONTEXT, INVALID, STOPPED, TextSeat, scripted_reply
+from socialai_dsl.llm.prompting import PromptOptions
 from socialai_dsl.llm.view import Style
 from tests.quick import one_in
 
@@ -82,9 +83,7 @@ def test_by_default_a_request_holds_all_that_was_seen_and_heard(name: str, tmp_p
         return answer(reply)
 
     seat = TextSeat(beside.env.program)
-    policy = players.ModelPolicy(
-        seat, players.PromptOptions(), lambda number: tmp_path / "transcript.jsonl", ask
-    )
+    policy = players.ModelPolicy(seat, PromptOptions(), lambda number: tmp_path / "transcript.jsonl", ask)
     at_once(play_async(Rooms(sd.make(name), [policy]), {AGENT: policy}, TestEpisodes(1)))
     (played,) = policy.played
     assert played.result.ending

@@ -19,7 +19,8 @@ xllamacpp = pytest.importorskip("xllamacpp", reason="llama.cpp comes with `make 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
 from socialai_dsl.llm.endpoint import Answer, Endpoint  # noqa: E402
-from socialai_dsl.llm.players import Conversation, ModelPolicy, PromptOptions  # noqa: E402
+from socialai_dsl.llm.players import Conversation, ModelPolicy  # noqa: E402
+from socialai_dsl.llm.prompting import PromptOptions  # noqa: E402
 
 pytestmark = pytest.mark.timeout(900)
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
-from types import ModuleType
+from math import isnan
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -141,36 +142,43 @@ def test_json_of_any_form_is_a_reply(openenv: Any, action: Any, message: str) ->
     assert openenv.Reply.model_validate(action).message == message
 
 
-@pytest.mark.skipif(
+without_inspect = pytest.mark.skipif(
     find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
 )
+
+
+@without_inspect
 def test_a_sample_is_played_to_its_end() -> None:
     model = Model([("hm", "stop"), ("I see", "max_tokens"), ("", "unknown"), ("Act: left", "stop")])
     with imported("inspect_task", inspect_ai(model)) as module:
         told = module.scenario("novel/fetch", episodes=1, language="de")
         assert told.metadata["language"] == "de"
         assert told.metadata["told"].startswith("Jemand in diesem Raum")
-        task = module.scenario(episodes=2)
+        task = module.scenario(episodes=2, probes="off")
         assert task.metadata["tell"] == "nothing"
         states = [TaskState(sample.metadata) for sample in task.dataset]
         for state in states:
             asyncio.run(task.solver(state, None))
         values = [asyncio.run(task.scorer(state, None)) for state in states]
-    assert {value.answer for value in values} <= set(playable_of("talkitout").outcomes)
-    found = values[0].metadata
-    assert (found["replies"], found["invalid"], found["stopped"], found["steps"]) == (5, 2, 1, 5)
+        scores = [SimpleNamespace(score=SimpleNamespace(value=1.0), sample_metadata=states[0].metadata)]
+        assert module.by_skill()(scores) == dict.fromkeys(sorted(states[0].metadata["skills"]), 1.0)
+    assert states[0].metadata["cast"] == ["agent", "wizard", "honest", "liar"]
+    (found,) = values[0].metadata["episodes"]
+    assert (found["replies"], found["invalid"], found["stopped"], found["steps"]) == (5, 1, 2, 5)
+    assert (values[0].value["invalid_rate"], values[0].value["stopped_rate"]) == (0.2, 0.4)
     assert model.asked[0][1].text == Episode("talkitout").reset(test_episode=0)
     assert [len(messages) for messages in model.asked] == [2, 4, 6, 8, 10, 2], "the whole episode"
+    assert [event["action"] for event in model.events] == [*[None] * 3, "Act: left", *["Act: done"] * 2]
+    assert [event["stop"] for event in model.events] == ["", "length", "unreadable", "", "", ""]
 
 
-@pytest.mark.skipif(
-    find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
-)
+@without_inspect
 def test_a_sample_of_several_players_is_of_the_seat_that_is_left() -> None:
     model = Model([])
     with imported("inspect_task", inspect_ai(model)) as module:
         task = module.scenario("together/help_together", episodes=1, seats={"agent": "script"})
-        assert (task.metadata["seat"], task.metadata["seats"]) == ("jill", {"agent": "script"})
+        assert task.metadata["seats"] == {"agent": "script"}
+        assert task.dataset[0].metadata["seat"] == "jill"
         state = TaskState(task.dataset[0].metadata)
         asyncio.run(task.solver(state, None))
         alike = Episode("together/help_together+oracle", seats={"agent": "script"})
@@ -178,22 +186,42 @@ def test_a_sample_of_several_players_is_of_the_seat_that_is_left() -> None:
         assert [message.text for message in model.asked[0]] == [alike.instructions, text]
         for told in model.asked[1:]:
             assert told[-1].text == alike.step("Act: done").text
-        assert asyncio.run(task.scorer(state, None)).metadata["steps"] == len(model.asked)
+        (found,) = asyncio.run(task.scorer(state, None)).metadata["episodes"]
+        assert found["steps"] == len(model.asked)
         with pytest.raises(ValueError, match="got 'jil', expected one of agent, jill"):
             module.scenario("together/help_together", seats={"jil": "script"})
 
 
-@pytest.mark.skipif(
-    find_spec("inspect_ai") is not None, reason="test_inspect.py plays with the library itself"
-)
+@without_inspect
 def test_a_limit_is_told_and_a_full_context_ends_a_sample() -> None:
     model = Model([("Act: left", "stop")] * 3 + [("The prompt is too long.", "model_length")])
     with imported("inspect_task", inspect_ai(model)) as module:
         with pytest.raises(ValueError, match="history: got 0"):
             module.scenario(episodes=1, history=0)
-        task = module.scenario(episodes=1, history=2)
+        task = module.scenario(episodes=1, history=2, probes="off")
         state = TaskState(task.dataset[0].metadata)
         asyncio.run(task.solver(state, None))
-        assert asyncio.run(task.scorer(state, None)).answer == "context full"
+        answer = asyncio.run(task.scorer(state, None)).answer
+        assert answer == "a conversation longer than the model's context"
     assert [len(messages) for messages in model.asked] == [2, 4, 4, 4]
     assert model.asked[-1][1].text.startswith("(2 earlier turns are left out here, ")
+
+
+@without_inspect
+def test_tools_objects_and_probes_of_a_suite() -> None:
+    model = Model([([("move", {"direction": "left"})], "stop"), ([("fly", {})], "stop")])
+    with imported("inspect_task", inspect_ai(model)) as module:
+        task = module.suite(["help", "novel/sally_anne"], episodes=2, mode="tools", trials=2)
+        states = [TaskState(sample.metadata) for sample in task.dataset]
+        for state in states:
+            asyncio.run(task.solver(state, None))
+        first, second = (asyncio.run(task.scorer(state, None)) for state in states)
+        spoken = module.scenario("novel/sally_anne", episodes=1, mode="json", probes="kept")
+        asyncio.run(spoken.solver(TaskState(spoken.dataset[0].metadata), None))
+    assert [len(messages) for messages in model.asked[:3]] == [2, 5, 8], "tools are answered"
+    assert {event.get("action") for event in model.events[:2]} == {"Act: left", None}
+    assert {"trial 1", "trial 2", "probe belief", "chance belief"} <= set(first.value)
+    assert isnan(first.value["probe belief"])
+    assert second.value["probe belief"] == 0
+    assert second.value["chance belief"] == 0.5
+    assert [message for message in states[0].messages if "Episode 2 of 2 begins" in message.text]
