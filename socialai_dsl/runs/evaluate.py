@@ -208,8 +208,8 @@ def made_players(
     partners = [
         (
             seat,
-            made_player(named, scenarios, of_models, out)
-            if isinstance(named, str) and named.startswith(MODEL_PREFIX)
+            made_player(named, scenarios, of_models if isinstance(named, str) else {}, out)
+            if isinstance(named, Player) or named.startswith(MODEL_PREFIX)
             else named,
         )
         for seat, named in seats
@@ -240,7 +240,9 @@ def made_player(
     """
     if isinstance(agent, Player):
         refuse_unknown("evaluate", options, (), "; a Player has them itself")
-        return agent
+        if out is None or agent.out is not None:
+            return agent
+        return replace(agent, out=session_folder(out) if agent.is_person else out)
     if not isinstance(agent, str | Path):
         refuse_unknown("evaluate", options, (), "; what you hand over plays as it is")
         return player_of(agent, scenarios[0] if scenarios else "")
