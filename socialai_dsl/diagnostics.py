@@ -104,6 +104,12 @@ CODES: Final[dict[str, str]] = {
     "W802": "something that never happens, or is not decided",
     "S803": "a test that fails",
     "S804": "a step of a test after the end of the episode",
+    # S9xx: studies with people
+    "S901": "more episodes than rooms",
+    "S902": "a design that cannot be balanced",
+    "S903": "a page or picture that is missing",
+    "S904": "a block without a person",
+    "W905": "groups that cannot be filled alike",
 }
 """Code -> one-line title, for every finding the product can make."""
 

@@ -27,6 +27,7 @@ from socialai_dsl.checking.scenarios import (
     with_frames,
     with_rival,
 )
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, check_seats, check_study, scripts_agent
 from socialai_dsl.checking.suites import check_suite
 from socialai_dsl.checking.tests import KIND as TESTS_OF
 from socialai_dsl.checking.tests import Tested, check_tests, tested_by
@@ -55,6 +56,7 @@ __all__ = [
     "Loaded",
     "LoadedExperiment",
     "LoadedScenario",
+    "LoadedStudy",
     "LoadedSuite",
     "Scripted",
     "Tested",
@@ -63,6 +65,7 @@ __all__ = [
     "load",
     "load_curriculum",
     "load_experiment",
+    "load_study",
     "variant_of",
 ]
 
@@ -287,6 +290,7 @@ class CheckResult:
         used: the places of the codes in comments that silenced a warning.
         experiment: the experiment with its conditions, if it is one and nothing is wrong with it.
         curriculum: the curriculum, if it is one and nothing is wrong with it.
+        study: the study, if it is one and nothing is wrong with it.
         tested: the scenarios that its tests play, with them; it may be a scenario or a file of tests.
     """
 
@@ -300,6 +304,7 @@ class CheckResult:
     used: frozenset[Span] = frozenset()
     experiment: LoadedExperiment | None = None
     curriculum: Curriculum | None = None
+    study: LoadedStudy | None = None
     tested: tuple[Tested, ...] = ()
 
     @property
@@ -463,6 +468,16 @@ def load_curriculum(path: str | Path) -> Curriculum:
     return result.curriculum or _refuse(result, "expected a curriculum")
 
 
+def load_study(path: str | Path) -> LoadedStudy:
+    """A study's file, with its scenarios.
+
+    Raises:
+        ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
+    """
+    result = check(path)
+    return result.study or _refuse(result, "expected a study")
+
+
 def _refuse(result: CheckResult, expected: str) -> NoReturn:
     """Raise what is wrong with a file, or that it is of another kind than expected."""
     resolved = result.read()
@@ -533,6 +548,12 @@ def _check(
             right = None if bag.has_errors else replace(experiment, played=played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
+    if resolved.kind == "study":
+        study, files = check_study(resolved, bag), dict(resolved.files)
+        if study is not None:
+            in_study = _check_study_played(study, bag, files)
+            study = None if bag.has_errors else replace(study, played=in_study)
+        return _sifted(CheckResult(name, None, None, tuple(bag), files, resolved, study=study))
     if resolved.kind == TESTS_OF:
         tested = check_tests(resolved, bag)
         found = tuple(said_once(bag))
@@ -562,9 +583,8 @@ def _check(
 def _sifted(result: CheckResult) -> CheckResult:
     """Without the warnings that comments ignore; a file whose warnings are all known is to have no idle ones."""
     assert result.resolved is not None, "internal: what was checked has been read"
-    meant = result.tested or any(
-        part is not None for part in (result.checked, result.suite, result.experiment, result.curriculum)
-    )
+    wholes = (result.checked, result.suite, result.experiment, result.curriculum, result.study)
+    meant = result.tested or any(part is not None for part in wholes)
     judged = display_name(result.resolved.path) if meant and not result.has_errors else None
     sifted = sift(result.diagnostics, result.sources, judged)
     suite = result.suite
@@ -604,7 +624,41 @@ def _check_played(
             what = _kind_of(result)
             bag.error("S108", f"this is {what}; only a scenario or a suite can be run", span)
             continue
-        _add_findings(result, place, experiment, bag, files)
+        _add_findings(result, place, experiment.resolved, bag, files)
+    return played
+
+
+def _check_study_played(
+    study: LoadedStudy, bag: DiagnosticBag, files: dict[str, Source]
+) -> dict[int, Loaded]:
+    """Check the scenarios of a study, and return those that are right by the number of their block."""
+    played: dict[int, Loaded] = {}
+    results: dict[str, CheckResult] = {}
+    for number, name, place in study.named():
+        known = name in results
+        result = results[name] = results.get(name) or check(name, base=study.folder)
+        span = study.resolved.tree.value_span(place)
+        loaded = None if result.has_errors else _loaded(result)
+        if result.has_errors:
+            if not known:
+                _add_findings(result, place, study.resolved, bag, files)
+            continue
+        if loaded is None:
+            message = f"this is {_kind_of(result)}; only a scenario or a suite can be played"
+            bag.error("S108", message, span)
+            continue
+        played[number] = loaded
+        if number == PRACTICE or not check_seats(study, number, loaded, bag):
+            continue
+        if scripts_agent(study.study.blocks[number]):
+            try:
+                played[number] = closest_script(name, loaded).loaded
+            except ScenarioError as error:
+                _add_findings(error, place, study.resolved, bag, files)
+                continue
+            if lacking := unscripted(played[number]):
+                hint = "give it a variant `oracle` in which the agent follows a frame, or the block `stands_in: random`"
+                bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
     return played
 
 
@@ -613,7 +667,7 @@ def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: di
     for path, place in experiment.curricula():
         result = check(path)
         if result.has_errors:
-            _add_findings(result, place, experiment, bag, files)
+            _add_findings(result, place, experiment.resolved, bag, files)
         elif result.curriculum is None:
             span = experiment.resolved.tree.value_span(place)
             bag.error("S108", f"this is {_kind_of(result)}; expected a curriculum", span)
@@ -630,7 +684,7 @@ def _check_scripts(
         try:
             closest = closest_script(from_anywhere(written, experiment.folder), played[written])
         except ScenarioError as error:
-            _add_findings(error, places[0], experiment, bag, files)
+            _add_findings(error, places[0], experiment.resolved, bag, files)
             continue
         lacking = unscripted(closest.loaded)
         for span in spans if lacking else ():
@@ -641,11 +695,11 @@ def _check_scripts(
 def _add_findings(
     result: CheckResult | ScenarioError,
     place: DataPath,
-    experiment: LoadedExperiment,
+    naming: ResolvedFile,
     bag: DiagnosticBag,
     files: dict[str, Source],
 ) -> None:
-    """The errors of something that an experiment names at a place: at their own, or in the name if that is wrong."""
+    """The errors of something that a file names at a place: at their own, or in the name if that is wrong."""
     files.update({source: text for source, text in result.sources.items() if source not in files})
     for finding in result.diagnostics:
         if finding.severity is not Severity.ERROR:
@@ -655,9 +709,9 @@ def _add_findings(
             continue
         meant = finding.suggestion
         if meant is not None and os.path.isabs(meant):
-            meant = os.path.relpath(meant, experiment.folder)
-        # A path that is written from the experiment's folder may be longer or shorter than that from here.
-        name = experiment.resolved.tree.at(place)
+            meant = os.path.relpath(meant, naming.path.parent)
+        # A path that is written from the file's folder may be longer or shorter than that from here.
+        name = naming.tree.at(place)
         asked = result.sources.get(finding.span.file)
         longer = len(finding.span.file if asked is None else asked.text) - len(str(name.value))
         offset, width = max(0, finding.span.column - 1 - longer), finding.span.width

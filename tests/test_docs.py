@@ -21,6 +21,7 @@ from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel
 from socialai_dsl.schema.scenario import SlotType
+from socialai_dsl.schema.study import Study
 from socialai_dsl.semantics.words import RESERVED, SIGNATURES
 from socialai_dsl.vocabulary import COLORS, DIRECTIONS, PRIMITIVES
 from tests.tiny import Folder
@@ -140,7 +141,7 @@ def headings(path: Path) -> set[str]:
     return {re.sub(r"[^\w -]", "", line.lower()).replace(" ", "-") for line in lines}
 
 
-KINDS = ("scenario", "npc", "variant", "suite", "library", "experiment")
+KINDS = ("scenario", "npc", "variant", "suite", "library", "experiment", "study")
 
 
 def kind(text: str) -> str | None:
@@ -264,7 +265,11 @@ def test_the_reference_has_every_instruction(name: str) -> None:
 
 
 MODELS = [*CALLED, ObjectLibrary, ObjectTypeModel, GrammarLibrary]
-PAGES = {Experiment.__module__: "experiments.md", Curriculum.__module__: "curricula.md"}
+PAGES = {
+    Experiment.__module__: "experiments.md",
+    Curriculum.__module__: "curricula.md",
+    Study.__module__: "studies.md",
+}
 """Module of models -> the page about its files, if that is not the one about the language."""
 
 

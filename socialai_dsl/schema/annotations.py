@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from socialai_dsl.schema import curriculum as c
 from socialai_dsl.schema import experiment as e
 from socialai_dsl.schema import scenario as s
+from socialai_dsl.schema import study as y
 from socialai_dsl.schema.files import TestsFile
 from socialai_dsl.schema.holds import TEXTS, Hides, Holds, Kind, Means, branches, said_of
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
@@ -69,6 +70,16 @@ CALLED: Final[dict[type, str]] = {
     c.Group: "a group of members",
     c.Ramp: "a weight that changes",
     c.Until: "the end of a phase",
+    y.Study: "a study",
+    y.Practice: "practice",
+    y.Criterion: "the criterion of practice",
+    y.Block: "a block",
+    y.Question: "a question",
+    y.Assign: "`assign`",
+    y.Pay: "`pay`",
+    y.Exclude: "`exclude`",
+    y.Recruit: "`recruit`",
+    y.End: "the end of a study",
 }
 """How messages call what a model describes."""
 
@@ -101,9 +112,9 @@ def home_of(key: str, owner: type | None) -> str | None:
 
 
 def _family(model: type | None) -> str:
-    """The kind of file that a model is a part of: an experiment, a curriculum, or any that is about scenarios."""
+    """The kind of file that a model is a part of: an experiment, a curriculum, a study, or any about scenarios."""
     module = model.__module__ if model is not None else ""
-    return module if module in (e.__name__, c.__name__) else ""
+    return module if module in (e.__name__, c.__name__, y.__name__) else ""
 
 
 def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:

@@ -12,6 +12,7 @@ from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.holds import Holds
 from socialai_dsl.schema.library import GrammarLibrary, ObjectLibrary
 from socialai_dsl.schema.scenario import DialogueTest, Model, Npc, Prose, Scenario, Word
+from socialai_dsl.schema.study import Study
 from socialai_dsl.schema.suite import Patch, Suite
 
 FileName = Annotated[str, Holds("file")]
@@ -47,6 +48,12 @@ class ExperimentFile(Experiment):
 
 class CurriculumFile(Curriculum):
     """A curriculum, perhaps built on another."""
+
+    extends: FileName | None = _EXTENDS
+
+
+class StudyFile(Study):
+    """A study, perhaps built on another."""
 
     extends: FileName | None = _EXTENDS
 
@@ -93,6 +100,7 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
     "library": (ObjectLibrary, GrammarLibrary),
     "experiment": (ExperimentFile,),
     "curriculum": (CurriculumFile,),
+    "study": (StudyFile,),
     "tests_of": (TestsFile,),
 }
 """The key that says the kind of a file -> the models of such files; exactly one of these keys is present."""

@@ -35,6 +35,7 @@ from socialai_dsl.schema.files import (
     ExperimentFile,
     NpcFile,
     ScenarioFile,
+    StudyFile,
     SuiteFile,
     TestsFile,
     VariantFile,
@@ -172,6 +173,7 @@ def read_at(root: str, path: DataPath, word: str) -> object:
         ("library: grammars", GrammarLibrary),
         ("variant: a", VariantFile),
         ("curriculum: a", CurriculumFile),
+        ("study: a", StudyFile),
     ],
 )
 def test_a_text_is_a_text_whatever_yaml_takes_it_for(root: str, model: type[BaseModel]) -> None:

@@ -1,0 +1,217 @@
+"""A study as models: what participants read, play and are asked, who plays what in which order, and what is paid."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Discriminator, Field, StringConstraints, Tag
+
+from socialai_dsl.schema.holds import Holds
+from socialai_dsl.schema.scenario import NOT_BLANK, ListOf, Model, Probability, Prose, Word, as_written
+from socialai_dsl.schema.suite import MemberName
+
+PERSON: Final = "person"
+"""Who has a seat that a participant plays."""
+
+WHO: Final = (PERSON, "script", "random", "nobody")
+"""Who can have a seat without being a trained agent."""
+
+TEST_ROOMS: Final = 500
+"""How many rooms the test set of a scenario has."""
+
+_Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=20_000)]
+Told = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
+"""What participants read, as it stands."""
+
+_Title = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+Option = Annotated[_Title, as_written(_Title | float | bool), Holds("label")]
+
+PageText = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
+"""The name of a file that ends in .md, beside the study, or the text itself, both in Markdown."""
+
+Who = Annotated[str, StringConstraints(min_length=1, max_length=1000), Holds("spelt")]
+Tell = Literal["nothing", "instructions"]
+Seconds = Annotated[int, Field(ge=1, le=3600)]
+
+
+class Criterion(Model):
+    """When practice is over."""
+
+    success: Probability = Field(description="share of the round's episodes that have to succeed")
+
+
+class Practice(Model):
+    """Episodes that do not count, in rounds until a participant can do it."""
+
+    scenario: MemberName = Field(description="the scenario, with variants and parameters")
+    episodes: int = Field(2, ge=1, le=100, description="episodes of a round")
+    until: Criterion | None = Field(None, description="the criterion; without one there is one round")
+    rounds: int = Field(
+        3, ge=1, le=20, description="the most rounds; then the study goes on, and the data say so"
+    )
+    tell: Tell | None = Field(None, description="as of a block")
+
+
+class Question(Model):
+    """A question to participants."""
+
+    id: Word = Field(description="its name in the data; each question of a study has its own")
+    ask: Told = Field(description="the question")
+    kind: Literal["text", "choice", "scale"] = Field("text", description="how it is answered")
+    options: Annotated[ListOf[Option], Field(min_length=2, max_length=100)] | None = Field(
+        None, description="of a choice: what can be chosen"
+    )
+    start: int | None = Field(
+        None, alias="from", ge=-1000, le=1000, description="of a scale: its first number"
+    )
+    to: int | None = Field(None, ge=-1000, le=1000, description="of a scale: its last number")
+    ends: Annotated[ListOf[Option], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="of a scale: what its first and its last number mean"
+    )
+    optional: bool = Field(False, description="whether it may be left out")
+
+
+Questions = Annotated[ListOf[Question], Field(max_length=200)]
+
+Rooms = Annotated[
+    Annotated[Literal["test"], Tag("word")]
+    | Annotated[
+        ListOf[Annotated[int, Field(ge=0, lt=TEST_ROOMS)]],
+        Field(min_length=1, max_length=TEST_ROOMS),
+        Tag("list"),
+    ],
+    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "word"),
+]
+
+
+class Block(Model):
+    """Episodes of a scenario that count."""
+
+    name: Word | None = Field(
+        None, description="its name in the data; default the scenario's name and its number"
+    )
+    scenario: MemberName = Field(description="the scenario, with variants and parameters")
+    episodes: int = Field(ge=1, le=TEST_ROOMS, description="how many are played")
+    rooms: Rooms = Field(
+        "test",
+        description="`test`: the rooms of the test set, in which agents are evaluated, beginning with number 0, or "
+        "behind those that blocks above it with the same scenario have; or a list of their numbers",
+    )
+    shuffle: bool = Field(
+        False, description="whether each participant plays the rooms in an order of their own"
+    )
+    view: Literal["both", "picture", "words"] = Field(
+        "both", description="the form in which participants get what their seat sees"
+    )
+    seats: dict[Annotated[str, Holds("spelt")], Who] | None = Field(
+        None,
+        description="member of the cast: `person`, `script`, `random`, `nobody`, shipped:NAME, or a checkpoint or run "
+        "folder, relative to this file; the agent is a person unless said otherwise, the others follow their scripts",
+    )
+    wait: Seconds = Field(
+        120, description="seconds after which a seat is filled by `stands_in` if no other person has come"
+    )
+    stands_in: Literal["script", "random", "nobody"] = Field(
+        "script", description="who takes the seat of a person who does not come, or leaves"
+    )
+    act_within: Seconds = Field(
+        60, description="seconds that others wait for an act; then `stands_in` plays that step"
+    )
+    away: Annotated[int, Field(ge=2, le=600)] = Field(
+        10, description="seconds without a sign of a participant's page, with which it counts as left"
+    )
+    tell: Tell | None = Field(
+        None, description="what is told of the task; default the scenario's `instructions` if it has some"
+    )
+    feedback: Literal["none", "outcome"] = Field(
+        "outcome", description="whether participants are told after an episode if it was a success"
+    )
+    groups: Annotated[ListOf[Annotated[int, Field(ge=1, le=100)]], Field(min_length=1)] | None = Field(
+        None, description="numbers of the groups that play it; default all"
+    )
+    questions: Questions = Field((), description="asked after the block")
+
+
+class Assign(Model):
+    """Who plays the blocks in which order. Each newcomer gets the group that has the fewest participants."""
+
+    order: Literal["fixed", "balanced"] = Field(
+        "fixed",
+        description="`fixed`: as in the file; `balanced`: by a balanced Latin square, in which each block "
+        "stands at each place, and behind each other block, equally often",
+    )
+    groups: int | None = Field(
+        None, ge=1, le=100, description="how many; default as many as there are orders"
+    )
+
+
+class Pay(Model):
+    """What participants are paid."""
+
+    currency: Annotated[str, StringConstraints(pattern=r"^[A-Z]{3}$"), Holds("spelt")] = Field(
+        "EUR", description="three letters, as of ISO 4217"
+    )
+    base: float | int = Field(0, ge=0, le=100_000, description="for everybody who comes to the end")
+    bonus: float | int = Field(0, ge=0, le=10_000, description="for each successful episode that counts")
+
+
+class Exclude(Model):
+    """Whose data are marked as excluded in `participants`; nothing is ever left out of the files."""
+
+    practice: bool = Field(False, description="those who did not reach the criterion of practice")
+    unfinished: bool = Field(True, description="those who did not come to the end")
+    success_below: Probability | None = Field(
+        None, description="those with a smaller share of successful episodes among those that count"
+    )
+    faster_than: int | None = Field(
+        None, ge=1, le=60_000, description="those whose median time to act is shorter; in milliseconds"
+    )
+
+
+class Recruit(Model):
+    """Participants who come from a platform, by the address `/join`."""
+
+    id: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), Holds("spelt")] = Field(
+        "PROLIFIC_PID",
+        description="the parameter of the address that says who comes; kept in a file of its own",
+    )
+    on_return: Literal["resume", "refuse"] = Field(
+        "resume", description="whether who comes a second time by the same id goes on, or is refused"
+    )
+
+
+class End(Model):
+    """The last page."""
+
+    code: Annotated[str, StringConstraints(min_length=1, max_length=80), Holds("label")] | None = Field(
+        None, description="the code that says that somebody came to the end"
+    )
+    say: Told | None = Field(None, description="what is said there besides thanks")
+    link: (
+        Annotated[str, StringConstraints(pattern=r"^https://\S+$", max_length=1000), Holds("spelt")] | None
+    ) = Field(None, description="where to go then, such as the platform's page of completion")
+
+
+class Study(Model):
+    """A study with people: consent, instructions, practice, blocks, questions, the end."""
+
+    study: Word = Field(description="the name of the study")
+    about: Prose | None = Field(None, description="one sentence for authors, which participants do not see")
+    notes: Prose | None = Field(None, description="more for authors")
+    language: Literal["en", "de", "fr"] = Field("en", description="the language of the page's own words")
+    consent: PageText = Field(
+        description="what participants agree to: a file that ends in .md, or the text itself",
+        examples=["consent.md"],
+    )
+    instructions: ListOf[PageText] = Field(
+        (), description="pages that are read before anything is played: files that end in .md, or texts"
+    )
+    practice: Practice | None = Field(None, description="episodes that do not count")
+    blocks: Annotated[ListOf[Block], Field(min_length=1, max_length=50)] = Field(description="what is played")
+    assign: Assign = Field(Assign(), description="who plays the blocks in which order")
+    participants: int | None = Field(None, ge=1, le=100_000, description="how many may take part")
+    questions: Questions = Field((), description="asked at the end")
+    pay: Pay | None = Field(None, description="what is paid")
+    exclude: Exclude = Field(Exclude(), description="whose data are marked as excluded")
+    recruit: Recruit = Field(Recruit(), description="how participants come")
+    end: End = Field(End(), description="the last page")
