@@ -37,6 +37,7 @@ from socialai_dsl.diagnostics import (
     DiagnosticBag,
     ScenarioError,
     Severity,
+    advice_on,
     bounded_suggestions,
     did_you_mean,
 )
@@ -545,6 +546,7 @@ def _check(
             played = _check_played(experiment, bag, files)
             _check_curricula(experiment, bag, files)
             _check_scripts(experiment, played, bag, files)
+            _check_rivals(experiment, played, bag)
             right = None if bag.has_errors else replace(experiment, played=played)
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
@@ -690,6 +692,20 @@ def _check_scripts(
         for span in spans if lacking else ():
             hint = "give it a variant `oracle` in which the agent follows a frame"
             bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
+
+
+def _check_rivals(experiment: LoadedExperiment, played: Mapping[str, Loaded], bag: DiagnosticBag) -> None:
+    """Check that the scenarios whose rivals are to play have them."""
+    for written, rival, place in experiment.rivals():
+        if written not in played:
+            continue
+        loaded = played[written]
+        for one in loaded.members if isinstance(loaded, LoadedSuite) else (loaded,):
+            if rival not in one.scenario.rivals:
+                hint = f"its rivals are {', '.join(one.scenario.rivals) or 'none'}"
+                advice = advice_on(rival, list(one.scenario.rivals), hint)
+                span = experiment.resolved.tree.value_span(place)
+                bag.error("S201", f"`{one.name}` has no rival `{rival}`", span, **advice)
 
 
 def _add_findings(

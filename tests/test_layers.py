@@ -55,19 +55,19 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "widths": (set(), set()),
     "grammar": ({"source", "diagnostics", "vocabulary", "widths"}, {"lark"}),
     "schema": (
-        {"source", "cures", "diagnostics", "errors", "vocabulary", "grammar"},
+        {"source", "cures", "diagnostics", "errors", "model_options", "vocabulary", "grammar"},
         {"pydantic", "pydantic_core", CONFIG},
     ),
     "semantics": (
         {"source", "cures", "diagnostics", "draws", "vocabulary", "widths", "grammar", "schema"},
-        set(),
+        {CONFIG},
     ),
     "loader": (
         TEXT_SIDE - {"frontend", "checking", "library"} | {"errors"},
         {"yaml", "pydantic", "pydantic_core"},
     ),
     "library": (TEXT_SIDE - {"frontend", "checking"}, {"pydantic"}),
-    "checking": (TEXT_SIDE - {"frontend"} | {"errors"}, {SHIPPED}),
+    "checking": (TEXT_SIDE - {"frontend"} | {"errors", "model_options"}, {SHIPPED, CONFIG}),
     "frontend": (TEXT_SIDE, set()),
     "authoring": (TEXT_SIDE | {"errors"}, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "vocabulary", "widths"}, {"numpy"}),

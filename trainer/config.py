@@ -332,6 +332,12 @@ LEARNS: Final = "ppo"
 UNTRAINED: Final = ("random", "oracle", "human")
 """Agents without a network: chance, the scenario's script, a person."""
 
+MODEL_PREFIX: Final = "llm:"
+"""How the names of language models begin."""
+
+RIVAL_PREFIX: Final = "rival:"
+"""How the names of a scenario's rivals begin."""
+
 PARTNERS_FOLDER: Final = "partners"
 """Where a run keeps the networks that played with its agent."""
 

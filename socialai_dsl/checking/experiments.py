@@ -10,12 +10,15 @@ from typing import Final
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
+from socialai_dsl.errors import OptionError
 from socialai_dsl.loader.reader import SUFFIXES, display_name, shipped_folder
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
 from socialai_dsl.source import DataPath
+from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, RunConfig
 from trainer.shipped import PREFIX, shipped_agents
 
 
@@ -71,6 +74,12 @@ class LoadedExperiment:
                 for name in (cell.scenario, *(cell.tests if key == "agent" else ())):
                     asked.setdefault(name, []).append(cell.places[key])
         return asked
+
+    def rivals(self) -> Iterator[tuple[str, str, DataPath]]:
+        """Each scenario of which a rival plays, by its name in the file, the rival, and where it is named."""
+        for cell in (cell for cells in self.cells.values() for cell in cells):
+            if cell.agent.startswith(RIVAL_PREFIX):
+                yield cell.scenario, cell.agent.removeprefix(RIVAL_PREFIX), cell.places["agent"]
 
     def _place(self, cell: Cell, written: str, key: str) -> DataPath:
         place = cell.places[key]
@@ -141,17 +150,46 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
 def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     shipped = [PREFIX + name for name in shipped_agents()]
     for cell in cells:
-        if cell.agent in (*AGENTS, *shipped) or (resolved.path.parent / cell.agent).exists():
+        _check_playing(cell, resolved, bag)
+        named = cell.agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)) and not cell.agent.endswith(":")
+        if named or cell.agent in (*AGENTS, *shipped) or (resolved.path.parent / cell.agent).exists():
             continue
         near = did_you_mean(cell.agent, (*AGENTS, *shipped))
         hint = (
             None
             if near
-            else f"an agent is {', '.join(AGENTS)}, {PREFIX}NAME, or the path of a checkpoint or of a run's folder"
+            else f"an agent is {', '.join(AGENTS)}, {PREFIX}NAME, {RIVAL_PREFIX}NAME, {MODEL_PREFIX}MODEL, or the path "
+            "of a checkpoint or of a run's folder"
         )
         folder = display_name(resolved.path.parent)
         message = f"there is no checkpoint `{cell.agent}` in {folder}"
         bag.error("S703", message, resolved.tree.value_span(cell.places["agent"]), suggestion=near, hint=hint)
+
+
+def _check_playing(cell: Cell, resolved: ResolvedFile, bag: DiagnosticBag) -> None:
+    """Check what settings say together of an agent that is not trained."""
+    episodes = cell.options.get("eval_episodes", RunConfig.model_fields["eval_episodes"].default)
+    if cell.trials > 1 and (cell.trains or episodes % cell.trials):
+        span = resolved.tree.value_span(cell.places["trials"])
+        hint = (
+            "give it to conditions with another agent"
+            if cell.trains
+            else "set `eval_episodes` to a multiple of it"
+        )
+        said = (
+            "an agent that is trained has no trials"
+            if cell.trains
+            else f"{episodes} episodes are no whole sessions"
+        )
+        bag.error("S104", f"{said} of {cell.trials}" if not cell.trains else said, span, hint=hint)
+    if cell.tests and (cell.trials > 1 or cell.agent.startswith((MODEL_PREFIX, RIVAL_PREFIX))):
+        span = resolved.tree.value_span(cell.places["tests"])
+        hint = "give the further scenarios conditions of their own"
+        bag.error("S104", f"`{cell.agent}` plays one scenario, without `tests`", span, hint=hint)
+    try:
+        ModelOptions(**cell.model)
+    except OptionError as error:
+        bag.error("S104", str(error), resolved.tree.value_span(cell.places["model"]))
 
 
 _NAMES: Final = {"net": NETS, "bonus": BONUSES, "guide": ("none", "script")}

@@ -27,11 +27,9 @@ from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.folder import CONFIG, agent_of
-from trainer.config import LEARNS, UNTRAINED
+from trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
 
-MODEL_PREFIX: Final = "llm:"
-RIVAL_PREFIX: Final = "rival:"
 HUMAN_FOLDER: Final = Path("runs", "human")
 """Where the sessions of people go unless the user says otherwise."""
 

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX, Player, participant_of
+from socialai_dsl.episodes.players import Player, participant_of
 from socialai_dsl.episodes.results import EvalResult, interval_over_rooms
 from socialai_dsl.episodes.scripts import with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.program_suite import seats_of
+from trainer.config import MODEL_PREFIX, RIVAL_PREFIX
 from trainer.shipped import PREFIX
 
 

@@ -23,7 +23,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Asker, probe_names
 from socialai_dsl.episodes.partners import company, sitting
 from socialai_dsl.episodes.play import AGENT, Seat
-from socialai_dsl.episodes.players import MODEL_PREFIX, Player
+from socialai_dsl.episodes.players import Player
 from socialai_dsl.episodes.results import EvalResult
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
@@ -34,6 +34,7 @@ from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces.endings import Ending
 from socialai_dsl.traces.tracing import Answers
+from trainer.config import MODEL_PREFIX
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint

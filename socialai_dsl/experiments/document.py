@@ -15,7 +15,7 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.runs.options import resolved_config, usual_options
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
-from trainer.config import BONUS_SCALES, WITHOUT_EFFECT, RunConfig
+from trainer.config import BONUS_SCALES, MODEL_PREFIX, RIVAL_PREFIX, WITHOUT_EFFECT, RunConfig
 from trainer.files import CHECKPOINTS, checkpoint_files
 from trainer.shipped import PREFIX, located
 
@@ -23,6 +23,9 @@ FORMAT: Final = 1
 
 OF_ANY_AGENT: Final = ("device", "eval_episodes")
 """Options that also matter to agents that are not trained."""
+
+_WITHOUT_EFFECT: Final = ("key_from", "concurrency", "timeout", "budget", "prices")
+"""Options of language models on which no reply depends."""
 
 _ID_LENGTH: Final = 12
 
@@ -45,7 +48,7 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
     weights = {
         cell.agent: _weights_digest(loaded.folder / located(cell.agent))
         for cell in cells
-        if cell.agent not in AGENTS
+        if not _is_named(cell.agent)
     }
     return {
         "format": FORMAT,
@@ -97,6 +100,9 @@ def run_id(cell: Cell, seed: int, program: str, agent: str, code: Mapping[str, s
         exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"})}
     )
     decisive = options | {"program": program, "agent": agent} | ({"code": dict(code)} if code else {})
+    decisive |= {"trials": cell.trials} if cell.trials > 1 else {}
+    asked = {name: value for name, value in cell.model.items() if name not in _WITHOUT_EFFECT}
+    decisive |= {"model": asked} if asked else {}
     text = json.dumps(decisive, sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_LENGTH]
 
@@ -125,7 +131,9 @@ def options_of(cell: Cell) -> dict[str, Any]:
     """
     config = config_of(cell).model_dump()
     if not cell.trains:
-        return {name: config[name] for name in OF_ANY_AGENT}
+        played = {name: config[name] for name in OF_ANY_AGENT}
+        played |= {"trials": cell.trials} if cell.trials > 1 else {}
+        return played | ({"model": dict(cell.model)} if cell.model else {})
     asked = [name for name in cell.options if name not in ("hyper", "recipe")]
     names = dict.fromkeys(
         ("net", "envs", "bonus", "device", "threads", "checkpoint_every", "eval_episodes", *asked)
@@ -221,8 +229,12 @@ def _options(cell: Cell, folder: Path) -> dict[str, Any]:
 
 def _agent(agent: str, folder: Path) -> str:
     """The agent of a condition as `socialai run` takes it from any folder."""
-    named = agent in AGENTS or agent.startswith(PREFIX)
-    return agent if named else str((folder / agent).resolve())
+    return agent if _is_named(agent) or agent.startswith(PREFIX) else str((folder / agent).resolve())
+
+
+def _is_named(agent: str) -> bool:
+    """Whether an agent has no weights: whoever plays by a name."""
+    return agent in AGENTS or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX))
 
 
 def _reference(reference: Reference | None) -> dict[str, Any] | None:

@@ -13,10 +13,12 @@ from socialai_dsl.atomic import read_json
 from socialai_dsl.errors import UnreadableError, first_mistake
 from socialai_dsl.experiments.record import ExperimentRecord
 from socialai_dsl.runs.folder import Run
-from trainer.config import UNTRAINED
+from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
 
 EXPERIMENT: Final = "experiment.json"
 RUNS: Final = "runs"
+_OF_PLAYERS: Final = ("hyper", "trials", "model")
+"""Options that are not those of `socialai run`."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +43,19 @@ class PlannedRun(Run):
     def options(self) -> dict[str, Any]:
         """Its options by name, scenario, agent and seed among them, as `socialai run --config` takes them."""
         condition = self.condition
-        options = {name: value for name, value in condition["options"].items() if name != "hyper"}
+        options = {name: value for name, value in condition["options"].items() if name not in _OF_PLAYERS}
         if condition["agent"] in UNTRAINED:
             options.pop("device", None)
         if condition["frames"] is not None:
             options["frames"] = condition["frames"]
         named = {"scenario": condition["scenario"], "agent": condition["agent"], "seed": self.seed}
         return {**named, **options, **condition["options"].get("hyper", {})}
+
+    @property
+    def is_played(self) -> bool:
+        """Whether `socialai evaluate` does it: nothing is trained, and `socialai run` has no such players."""
+        named = self.condition["agent"].startswith((MODEL_PREFIX, RIVAL_PREFIX))
+        return bool(named or "trials" in self.condition["options"])
 
     @property
     def missing_tests(self) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,14 +18,24 @@ from typing import IO, Final
 from socialai_dsl.atomic import write_json
 from socialai_dsl.errors import UnreadableError, described_error
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
-from socialai_dsl.runs.folder import CANCEL, CHECKPOINTS, CONFIG, OPTIONS, TESTS
+from socialai_dsl.runs.folder import (
+    CANCEL,
+    CHECKPOINTS,
+    CONFIG,
+    OPTIONS,
+    RESULT,
+    TESTS,
+    scenario_folder_name,
+)
 from socialai_dsl.runs.lock import HeldError
 from socialai_dsl.runs.status import State, Status
-from trainer.config import UNTRAINED
+from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
 from trainer.files import checkpoint_files
 
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
+PLAYED: Final = "played"
+"""The folder in a run's where `socialai evaluate` plays."""
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
 _SECONDS_TO_SAVE: Final = 10.0
 """How long a process that is ended may take to save its checkpoint."""
@@ -177,6 +188,8 @@ class _Work:
         died_at: list[int] = []
         while not self._has_result():
             crash = self._process(self._run_command())
+            if crash is None and self._run.is_played:
+                self._take_results()
             if crash is None:
                 assert self._has_result(), "internal: a run that ended well has no result"
                 return
@@ -210,7 +223,31 @@ class _Work:
         figures = {name: entry["eval"] for name, entry in zip(missing, found, strict=True)}
         write_json(self._run.folder / TESTS, self._run.tested | figures)
 
+    def _take_results(self) -> None:
+        """Move what `socialai evaluate` left for the scenario to where a run has it, its result last."""
+        place = self._run.folder / PLAYED / scenario_folder_name(self._condition["scenario"])
+        for path in sorted(place.iterdir(), key=lambda path: path.name == RESULT):
+            path.replace(self._run.folder / path.name)
+        shutil.rmtree(self._run.folder / PLAYED)
+
+    def _play_command(self) -> list[str]:
+        condition, options = self._condition, self._condition["options"]
+        asked = dict(options.get("model", {}))
+        switches = [f"--{name}" for name, value in asked.items() if value is True]
+        values = {
+            name.replace("_", "-"): value for name, value in asked.items() if not isinstance(value, bool)
+        }
+        values |= {"episodes": options["eval_episodes"], "trials": options.get("trials", 1)}
+        agent = condition["agent"]
+        if agent != "oracle" and not agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)):
+            values |= {"seed": self._run.seed} | ({} if agent in UNTRAINED else {"device": options["device"]})
+        words = [word for name, value in values.items() for word in (f"--{name}", str(value))]
+        out = ["--out", str(self._run.folder / PLAYED), "--json"]
+        return ["evaluate", agent, "--on", condition["scenario"], *words, *switches, *out]
+
     def _run_command(self) -> list[str]:
+        if self._run.is_played:
+            return self._play_command()
         folder = self._run.folder
         config = folder / CONFIG
         if self._is_trained and config.exists() and checkpoint_files(folder / CHECKPOINTS):

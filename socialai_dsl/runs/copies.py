@@ -11,14 +11,13 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
 from socialai_dsl.envs.seats import NOBODY, RANDOM, SCRIPT
-from socialai_dsl.episodes.players import MODEL_PREFIX, RIVAL_PREFIX
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
 from socialai_dsl.runs.folder import SCENARIO
-from trainer.config import PARTNERS_FOLDER, RunConfig, scenario_in
+from trainer.config import MODEL_PREFIX, PARTNERS_FOLDER, RIVAL_PREFIX, RunConfig, scenario_in
 from trainer.files import CHECKPOINTS, SUFFIX
 from trainer.shipped import PREFIX
 

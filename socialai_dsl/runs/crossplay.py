@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.atomic import write_json
-from socialai_dsl.episodes.players import MODEL_PREFIX, Agent, require_trainer
+from socialai_dsl.episodes.players import Agent, require_trainer
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.crossplay import CrossPlay, cross_play
 from socialai_dsl.evaluation.sessions import recordings_of, who_has_played
@@ -15,6 +15,7 @@ from socialai_dsl.frontend import load
 from socialai_dsl.runs.evaluate import made_player
 from socialai_dsl.runs.folder import CROSSPLAY, new_folders
 from socialai_dsl.runs.report import require_libraries
+from trainer.config import MODEL_PREFIX
 
 PICTURE: Final = "crossplay"
 """The name of the picture, without its endings."""

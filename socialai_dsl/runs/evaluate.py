@@ -16,7 +16,6 @@ from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.episodes.partners import called, partners_of
 from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
-    MODEL_PREFIX,
     Agent,
     Player,
     folder_of,
@@ -46,7 +45,7 @@ from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
 from socialai_dsl.traces.endings import short_name
-from trainer.config import RunConfig
+from trainer.config import MODEL_PREFIX, RunConfig
 
 _PLAYER: Final = ("greedy", "seed", "device", "net", "algorithm")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))

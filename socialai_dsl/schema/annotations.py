@@ -65,6 +65,7 @@ CALLED: Final[dict[type, str]] = {
     e.Profile: "a profile",
     e.Transfer: "a test",
     e.Reference: "a reference",
+    e.Asked: "options of a model",
     c.Curriculum: "a curriculum",
     c.Phase: "a phase",
     c.Group: "a group of members",

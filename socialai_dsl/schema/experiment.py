@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_type_hints
 
 from pydantic import (
     BeforeValidator,
@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from socialai_dsl.errors import first_mistake
+from socialai_dsl.model_options import ModelOptions, meanings
 from socialai_dsl.schema.holds import Holds, branches
 from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many, as_written
 from socialai_dsl.schema.suite import MemberName
@@ -87,6 +88,28 @@ def _made_optional(names: Iterable[str]) -> dict[str, Any]:
     return fields
 
 
+_LEAST: Final[dict[str, Any]] = {
+    "history": {"ge": 1},
+    "max_tokens": {"ge": 1},
+    "concurrency": {"ge": 1},
+    "timeout": {"gt": 0},
+}
+"""The least that options of language models can be."""
+
+
+def _asked() -> dict[str, Any]:
+    """Fields of `ModelOptions` as keys that may be left out: the same meaning and words."""
+    told = meanings()
+    fields: dict[str, Any] = {}
+    for name, annotation in get_type_hints(ModelOptions).items():
+        if annotation is float or annotation == float | None:
+            annotation = float | int
+        if str in branches(annotation):
+            annotation = Annotated[annotation, Holds("spelt")]
+        fields[name] = (annotation | None, Field(None, description=told.get(name), **_LEAST.get(name, {})))
+    return fields
+
+
 _WORDS: Final[dict[str, Any]] = {"device": Literal["cpu", "cuda"]}
 """Options of which a file may say less than a command line."""
 
@@ -101,6 +124,9 @@ if TYPE_CHECKING:
     class _RunOptions(Model):
         """Options of `socialai-run`."""
 
+    class Asked(Model):
+        """How a language model is asked; what is left out is as `socialai evaluate` has it."""
+
 else:
     Hyper = create_model(
         "Hyper",
@@ -109,6 +135,12 @@ else:
         **_made_optional(HYPER),
     )
     _RunOptions = create_model("_RunOptions", __base__=Model, **_made_optional(OPTIONS))
+    Asked = create_model(
+        "Asked",
+        __base__=Model,
+        __doc__="How a language model is asked; what is left out is as `socialai evaluate` has it.",
+        **_asked(),
+    )
 
 
 class Settings(_RunOptions):
@@ -122,7 +154,8 @@ class Settings(_RunOptions):
     )
     agent: Annotated[str, StringConstraints(min_length=1, max_length=1000), Holds("spelt")] | None = Field(
         None,
-        description="ppo (default), random, oracle, shipped:NAME, or a checkpoint or run folder, relative to this file",
+        description="ppo (default), random, oracle, shipped:NAME, rival:NAME, llm:MODEL, or a checkpoint or run "
+        "folder, relative to this file",
     )
     frames: int | None = Field(None, ge=1, le=MOST_FRAMES, description="frames to train for")
     seeds: (
@@ -136,6 +169,13 @@ class Settings(_RunOptions):
     tests: ListOf[Test] | None = Field(
         None, description="scenarios that the agents play besides their own when they are trained"
     )
+    trials: int | None = Field(
+        None,
+        ge=1,
+        le=500,
+        description="how many test episodes in a row an agent that is not trained remembers",
+    )
+    model: Asked | None = Field(None, description="how a language model is asked")
     reference: Reference | None = Field(None, description="a published figure of the scenario itself")
     recipe: Literal["plain", "guided", "paper"] | None = Field(
         None,

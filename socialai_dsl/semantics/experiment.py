@@ -12,6 +12,7 @@ from socialai_dsl.diagnostics import DiagnosticBag, advice_on
 from socialai_dsl.schema.annotations import annotation_at, literals
 from socialai_dsl.schema.experiment import OPTIONS as KEYS
 from socialai_dsl.schema.experiment import (
+    Asked,
     Condition,
     Experiment,
     Grid,
@@ -24,6 +25,7 @@ from socialai_dsl.schema.experiment import (
     one_setting,
 )
 from socialai_dsl.source import DataPath, Node
+from trainer.config import MODEL_PREFIX, RIVAL_PREFIX
 
 MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""
@@ -39,12 +41,13 @@ class Cell:
     Attributes:
         name: its own. group: of conditions shown together, if any. row, column: its place in the group's table.
         scenario: with all variants, as it is written in the file, so a path is relative to that.
-        agent: `ppo`, `random`, `oracle`, or a path relative to the file.
+        agent: `ppo`, `random`, `oracle`, `rival:NAME`, `llm:MODEL`, or a path relative to the file.
         frames: to train for; None where nothing is trained, or where the recipe `guided` takes it from the scenario.
         seeds: one run for each.
         options: those of `OPTIONS` that are given.
         tests: scenarios played besides, with all variants -> what was found elsewhere.
         reference: what was found elsewhere on the scenario itself.
+        trials: how many test episodes in a row the agent remembers. model: how a language model is asked.
         places: setting -> where its value stands.
     """
 
@@ -59,6 +62,8 @@ class Cell:
     options: Mapping[str, Any]
     tests: Mapping[str, Reference | None]
     reference: Reference | None
+    trials: int
+    model: Mapping[str, Any]
     places: Mapping[str, DataPath]
 
     @property
@@ -280,7 +285,7 @@ class _Expansion:
         places: dict[str, DataPath] = {}
         for layer in draft.layers:
             for name, value, place in layer.given():
-                if isinstance(value, Hyper):  # of two layers each may give some
+                if isinstance(value, Hyper | Asked):  # of two layers each may give some
                     value = given.get(name, {}) | value.model_dump(exclude_none=True)
                 given[name], places[name] = value, place
         if "scenario" not in given:
@@ -308,14 +313,16 @@ class _Expansion:
             with_variants(given["scenario"], variants),
             agent,
             given.get("frames"),
-            # A script plays the test set in one way only.
-            seeds[:1] if agent == "oracle" else seeds,
+            # Scripts and rivals play the test set in one way only; of models nobody knows what a seed is.
+            seeds[:1] if agent == "oracle" or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)) else seeds,
             {name: given[name] for name in OPTIONS if name in given},
             {
                 with_variants(name, variants): reference
                 for name, reference in map(_tested, given.get("tests", ()))
             },
             given.get("reference"),
+            given.get("trials", 1),
+            given.get("model", {}) if agent.startswith(MODEL_PREFIX) else {},
             places,
         )
 
