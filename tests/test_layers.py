@@ -113,6 +113,23 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "episodes", "render", "traces"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
+    "web": ({"traces"}, {"starlette"}),
+    "study": (
+        TEXT_SIDE
+        | {
+            "errors",
+            "atomic",
+            "program",
+            "program_suite",
+            "envs",
+            "episodes",
+            "traces",
+            "llm",
+            "web",
+            "runs.lock",
+        },
+        {"numpy", "pydantic", "markdown_it", "starlette", "uvicorn", "websockets", "pyarrow", SHIPPED},
+    ),
     "runs.options": (
         TEXT_SIDE | {"errors"},
         {"pydantic", "torch", "yaml", CONFIG},
@@ -230,7 +247,7 @@ def test_the_trainer_sees_only_the_facade() -> None:
 
 def test_environments_are_played_in_rooms_alone() -> None:
     """Whoever plays, plays in `episodes.Rooms`; the trainer collects, and what lies below looks into the engine."""
-    above = ("episodes", "evaluation", "llm", "play", "runs", "studio", "cli", "traces")
+    above = ("episodes", "evaluation", "llm", "play", "runs", "studio", "study", "cli", "traces")
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for package in above

@@ -29,6 +29,7 @@ _GROUPS: Final = {
     "see them played": ("play", "trace", "replay", "studio"),
     "train and evaluate agents": ("run", "evaluate", "crossplay", "words", "export", "serve"),
     "many runs": ("experiment", "report"),
+    "studies with people": ("study",),
     "editors": ("schema", "lsp"),
 }
 """What users do -> the commands for it; each is a module beside this one."""

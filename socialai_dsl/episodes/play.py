@@ -86,7 +86,7 @@ class Rooms:
         own: see above.
         seats: those that are played: of a vector environment with all seats, else the one that the caller plays.
         count: E; 1 of a single environment.
-        observations: of each seat, arrays of E.
+        observations: of each seat that is played, arrays of E. seen: of each seat of the game.
         info: what the environment returned last.
         numbers: int64 (E,), of the episodes; -1 where none has begun.
         running: bool (E,), where an episode goes on.
@@ -104,6 +104,8 @@ class Rooms:
     ) -> None:
         self.env = env.unwrapped
         self._many = isinstance(self.env, gymnasium.vector.VectorEnv)
+        self.seen: dict[Seat, Observation] = {}
+        self.observations: dict[Seat, Observation] = {}
         if self._many:
             mode = self.env.metadata.get("autoreset_mode")
             if mode is not gymnasium.vector.AutoresetMode.DISABLED:
@@ -114,11 +116,9 @@ class Rooms:
         if strange := {self.own, *scripts} - set(self.names):
             raise ValueError(f"seats: got {', '.join(sorted(strange))}, expected {', '.join(self.names)}")
         if scripts:
-            played = [name in self.seats for name in self.names]
-            self.env.set_taken(np.tile(played, int(self.env.num_envs) // len(self.names)))
+            self.leave_to_scripts(scripts)
         self.count = int(self.env.num_envs) // len(self.names) if self._many else 1
         self.observers = tuple(observers)
-        self.observations: dict[Seat, Observation] = {}
         self.info: Mapping[str, Any] = {}
         self.numbers, self.running = np.full(self.count, -1), np.zeros(self.count, np.bool_)
 
@@ -148,6 +148,24 @@ class Rooms:
         self.running = self.running | mask
         for observer in self.observers:
             observer.began(self, mask)
+
+    def leave_to_scripts(self, scripts: Collection[Seat]) -> None:
+        """Say which seats nobody plays from the next step on; of a vector environment with all seats.
+
+        Args:
+            scripts: those that follow their frames then, or stay where they follow none; all others are played.
+
+        Raises:
+            ValueError: there is no such seat, or it is the agent's, which is always played.
+        """
+        if strange := set(scripts) - set(self.names[1:]):
+            expected = ", ".join(self.names[1:]) or "none"
+            raise ValueError(f"seats: got {', '.join(sorted(strange))}, expected {expected}")
+        self.seats = tuple(name for name in self.names if name not in scripts)
+        if len(self.names) > 1:
+            played = [name in self.seats for name in self.names]
+            self.env.set_taken(np.tile(played, int(self.env.num_envs) // len(self.names)))
+        self.observations = {name: self.seen[name] for name in self.seats if name in self.seen}
 
     def step(self, actions: Mapping[Seat, Int64]) -> Step:
         """Play a step in all rooms.
@@ -254,11 +272,11 @@ class Rooms:
 
     def _see(self, observation: Observation) -> None:
         whole = observation if self._many else {name: value[None] for name, value in observation.items()}
-        self.observations = {
+        self.seen = {
             seat: {name: value[number :: len(self.names)] for name, value in whole.items()}
             for number, seat in enumerate(self.names)
-            if seat in self.seats
         }
+        self.observations = {seat: self.seen[seat] for seat in self.seats}
 
 
 class Agenda(Protocol):

@@ -11,10 +11,10 @@ from urllib.parse import unquote, urlsplit
 from pydantic import BaseModel, ConfigDict, Discriminator, Tag, TypeAdapter, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from socialai_dsl.studio.connection import close, contents
 from socialai_dsl.studio.engine import Worker
 from socialai_dsl.studio.files import FileError, Folder
 from socialai_dsl.studio.messages import LARGEST_MESSAGE, problem
+from socialai_dsl.web.connection import close, contents
 
 _MOST_WAITING: Final = 1000
 _NO_REQUEST: Final = -32600

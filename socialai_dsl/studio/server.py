@@ -7,19 +7,16 @@ import contextlib
 import logging
 import secrets
 from collections.abc import AsyncIterator
-from html import escape
 from pathlib import Path
 from typing import Final
-from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from socialai_dsl.studio import MOST_WINDOWS
-from socialai_dsl.studio.connection import close
 from socialai_dsl.studio.engine import EngineLostError, start_worker
 from socialai_dsl.studio.files import Folder
 from socialai_dsl.studio.language import serve_editor
@@ -27,13 +24,13 @@ from socialai_dsl.studio.messages import LARGEST_MESSAGE
 from socialai_dsl.studio.sharing import NO_GAME, Invitations
 from socialai_dsl.studio.window import Window, Windows
 from socialai_dsl.studio.worker import answer_window, serve_language
-from socialai_dsl.traces.scripts import static_text
+from socialai_dsl.web.connection import close
+from socialai_dsl.web.pages import Address, page, static_file
 
 LARGEST_FRAME: Final = 32 * LARGEST_MESSAGE
 """Bytes of a message that is read at all; a longer one ends its connection."""
 WRONG_TOKEN: Final = 4403
 NO_ROOM: Final = 4429
-_LOOPBACK: Final = ("127.0.0.1", "::1")
 _OWN: Final = (
     "editor.js",
     "found.js",
@@ -44,24 +41,6 @@ _OWN: Final = (
     "studio.js",
     "writing.js",
 )
-_SHARED: Final = ("dom.js", "panels.js", "room.js", "tiles.js", "trace.js", "pages.css")
-_PAGE: Final = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="style-nonce" content="{nonce}">
-<title>{title}</title>
-<link rel="stylesheet" href="/static/pages.css">
-<link rel="stylesheet" href="/static/studio.css">
-<link rel="icon" href="data:,">
-</head>
-<body data-root="{root}" data-open="{opened}">
-<noscript>The studio needs scripts.</noscript>
-<script type="module" src="/static/{script}"></script>
-</body>
-</html>
-"""
 
 
 class Studio:
@@ -74,7 +53,8 @@ class Studio:
 
     def __init__(self, root: Path, opened: str, token: str, host: str, most: int = MOST_WINDOWS) -> None:
         self._folder = Folder(root)
-        self._opened, self._token, self._host, self._most = opened, token, host, most
+        self._opened, self._token, self._most = opened, token, most
+        self._address = Address(host)
         self._windows, self._editors, self._invitations = Windows(), 0, Invitations(token)
         self.app = Starlette(
             routes=[
@@ -105,7 +85,7 @@ class Studio:
     # -- pages -----------------------------------------------------------------------------------------------
 
     async def _page(self, request: Request) -> Response:
-        if not self._is_known(request.query_params.get("token")) or not self._is_own_host(
+        if not self._is_known(request.query_params.get("token")) or not self._address.is_own(
             request.headers.get("host")
         ):
             words = "This address lacks the token that `socialai studio` has printed; open the whole address."
@@ -115,40 +95,18 @@ class Studio:
 
     async def _guest_page(self, request: Request) -> Response:
         """The page of a person who was invited to a seat; whether the link is good its connection is told."""
-        if not self._is_own_host(request.headers.get("host")):
+        if not self._address.is_own(request.headers.get("host")):
             return PlainTextResponse("This is not the address of the studio.", 403)
         return self._filled("guest.js", "a game for several")
 
-    def _filled(self, script: str, title: str, root: str = "", opened: str = "") -> Response:
+    @staticmethod
+    def _filled(script: str, title: str, root: str = "", opened: str = "") -> Response:
         """The page with one of our scripts."""
-        nonce = secrets.token_urlsafe(16)
-        words = {"title": escape(title), "root": escape(root), "opened": escape(opened)}
-        return self._guarded(HTMLResponse(_PAGE.format(nonce=nonce, script=script, **words)), nonce)
+        words = "The studio needs scripts."
+        return page(script, "studio.css", title, words, root=root, open=opened)
 
     async def _static(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        if name in _SHARED:
-            text = static_text(name)
-        elif name in _OWN:
-            text = (Path(__file__).parent / "static" / name).read_text(encoding="utf-8")
-        else:
-            return PlainTextResponse("there is no such file", 404)
-        kind = "text/css" if name.endswith(".css") else "text/javascript"
-        return self._guarded(Response(text, media_type=kind), "")
-
-    @staticmethod
-    def _guarded(response: Response, nonce: str) -> Response:
-        response.headers.update(
-            {
-                "Content-Security-Policy": "default-src 'none'; script-src 'self'; connect-src 'self'; "
-                f"img-src 'self' data:; style-src 'self' 'nonce-{nonce}'; "
-                "base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-                "Referrer-Policy": "no-referrer",
-                "X-Content-Type-Options": "nosniff",
-                "Cache-Control": "no-store",
-            }
-        )
-        return response
+        return static_file(request.path_params["name"], _OWN, Path(__file__).parent / "static")
 
     # -- websockets ------------------------------------------------------------------------------------------
 
@@ -199,8 +157,7 @@ class Studio:
 
     async def _comes_from_us(self, socket: WebSocket) -> bool:
         """Accept a connection from our own page."""
-        host, origin = socket.headers.get("host"), socket.headers.get("origin")
-        if not self._is_own_host(host) or origin != f"http://{host}":
+        if not self._address.comes_from_us(socket.headers.get("host"), socket.headers.get("origin")):
             await close(socket, 1008)
             return False
         await socket.accept()
@@ -216,15 +173,6 @@ class Studio:
 
     def _is_known(self, token: str | None) -> bool:
         return token is not None and secrets.compare_digest(token.encode(), self._token.encode())
-
-    def _is_own_host(self, host: str | None) -> bool:
-        """Whether the page was asked for under our own address, not under a name that leads here."""
-        if self._host not in _LOOPBACK:
-            return True
-        try:
-            return urlsplit(f"//{host}").hostname in (*_LOOPBACK, "localhost")
-        except ValueError:
-            return False
 
 
 def _is_failure(record: logging.LogRecord) -> bool:

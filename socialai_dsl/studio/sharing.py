@@ -13,7 +13,6 @@ from typing import Final
 
 from starlette.websockets import WebSocket
 
-from socialai_dsl.studio.connection import close, contents, send, send_soon
 from socialai_dsl.studio.engine import Engine, EngineLostError
 from socialai_dsl.studio.messages import (
     ANSWERS,
@@ -29,6 +28,7 @@ from socialai_dsl.studio.messages import (
     Refused,
     parsed,
 )
+from socialai_dsl.web.connection import close, contents, send, send_soon
 
 NO_GAME: Final = 4404
 TAKEN: Final = 4409

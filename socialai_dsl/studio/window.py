@@ -11,13 +11,13 @@ from typing import Any, Final
 from starlette.websockets import WebSocket
 
 from socialai_dsl.studio import messages
-from socialai_dsl.studio.connection import contents, send, send_soon
 from socialai_dsl.studio.drafts import new_window
 from socialai_dsl.studio.engine import Engine, EngineLostError
 from socialai_dsl.studio.files import ConflictError, FileError, Folder
 from socialai_dsl.studio.filing import Filing
 from socialai_dsl.studio.messages import WINDOW_QUESTIONS, Refused, parsed
 from socialai_dsl.studio.sharing import Invitations, SharedGame
+from socialai_dsl.web.connection import contents, send, send_soon
 
 _CLAIM_SECONDS: Final = 1.0
 _MOST_WAITING: Final = 200

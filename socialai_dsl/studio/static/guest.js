@@ -1,12 +1,12 @@
 // @ts-check
 /** The page of a person who was invited to a seat of a game that goes on in somebody else's window. */
 import { make, panel } from "./dom.js";
-import { MOVES, observed } from "./parts.js";
 import { drawPicture } from "./room.js";
+import { MOVES, observed, pictureOf } from "./seat.js";
 
 /** @typedef {Record<string, any>} Reply */
 
-const TRY_EVERY = 1000, VIEW = 7, UP = 3, TILE = 64;
+const TRY_EVERY = 1000, TILE = 64;
 const LOST = "the connection was lost; this page goes on when it is there again";
 
 class Guest {
@@ -108,12 +108,6 @@ class Guest {
   tell(text) {
     this.message.textContent = text;
   }
-}
-
-/** What is seen, as it is drawn. @param {Reply} view @returns {import("./trace.js").Picture} */
-function pictureOf({ cells, gestures, held, marks }) {
-  const shown = gestures.map((/** @type {any[]} */ [cell, pointing, act, ...at]) => [cell, { pointing, act, at }]);
-  return { width: VIEW, height: VIEW, cells, agent: [(VIEW - 1) / 2, VIEW - 1, UP], below: new Map(), gestures: new Map(shown), held: new Map(held), marks: new Map(marks), tinted: false };
 }
 
 new Guest();

@@ -2,16 +2,13 @@
 /** The parts of the page that show an episode and that replays do not have; as those of panels.js. */
 import { make, panel } from "./dom.js";
 import { drawPicture } from "./room.js";
+import { MARBLE, observed } from "./seat.js";
 import { NPC } from "./tiles.js";
 
 /** @typedef {import("./trace.js").Episode} Episode */
 
-const MARBLE = 16, UP = 3, VIEW = 7;
+const UP = 3, VIEW = 7;
 const AGENT = "the agent";
-/** What keys do. @type {Record<string, string>} */
-export const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
-  t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
-
 /** All rules with how often they have fired, in this episode and in all since the text was changed. */
 export class Counts {
   /** @param {(at: string) => void} open */
@@ -60,19 +57,6 @@ export class Counts {
     });
     this.rows.replaceChildren(...met, ...others.map((name) => make("li", { class: "not" }, make("b", {}, "0× "), name, make("small", {}, " · not asked yet"))));
   }
-}
-
-/** The view with directions as the observation has them: where they are those of a compass, the agent's own is not given.
- * @param {import("./trace.js").Picture} view @param {number} facing where the agent looks @param {boolean} compass
- * @returns {import("./trace.js").Picture} */
-export function observed(view, facing, compass) {
-  const turned = (/** @type {number} */ drawn) => (drawn + facing + 1) % 4;
-  const turns = (/** @type {number} */ type) => type === MARBLE || (type === NPC && compass);
-  const cells = view.cells.map(([type, colour, status, drawn]) =>
-    /** @type {import("./trace.js").Look} */ ([type, colour, status, turns(type) ? turned(drawn) : drawn]));
-  const gestures = new Map([...view.gestures].map(([cell, one]) =>
-    [cell, compass && one.pointing >= 0 ? { ...one, pointing: turned(one.pointing) } : one]));
-  return { ...view, cells, gestures };
 }
 
 /** What a person on a seat gets, and nothing else. */

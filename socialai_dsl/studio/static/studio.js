@@ -5,7 +5,8 @@ import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Seats, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { claimItems, findingItems, marked, page, roomInWords, testItems, verdictOf } from "./found.js";
 import { Line, address, settings } from "./line.js";
-import { Counts, MOVES, Seat, Views } from "./parts.js";
+import { Counts, Seat, Views } from "./parts.js";
+import { MOVES } from "./seat.js";
 import { Episode, slotsOf } from "./trace.js";
 import { Writing } from "./writing.js";
 

@@ -1,0 +1,638 @@
+"""A study that goes on: what pages ask for becomes events, which are stored, and then what is shown."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from markdown_it import MarkdownIt
+
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of
+from socialai_dsl.episodes.play import Seat
+from socialai_dsl.errors import UsageError
+from socialai_dsl.schema.study import WHO, Question
+from socialai_dsl.study.arena import Action, Arena, Episode
+from socialai_dsl.study.log import FILE, FORMAT, Event, Log, read_log
+from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
+from socialai_dsl.study.progress import Game, Participant, Progress
+from trainer.shipped import PREFIX
+
+MOST_LINES: Final = 200
+"""How many of the last lines that were heard a page shows."""
+_BURST: Final = 60
+_PER_SECOND: Final = 20
+"""Messages that a page may send: at once, and in each second."""
+
+
+@dataclass(eq=False)
+class Page:
+    """An open page of a participant.
+
+    Attributes:
+        person: whose. send: takes what is to be shown. leave: closes the connection with a code and words.
+        connection: which of the participant's it is, from 1. sign: when it was last heard.
+        knows: the game of which it has been told what can be done and said.
+    """
+
+    person: str
+    send: Callable[[Screen], None]
+    leave: Callable[[int, str], None]
+    connection: int
+    sign: float
+    knows: str | None = None
+    _tokens: float = _BURST
+
+    def may_speak(self, now: float) -> bool:
+        """Whether it has not sent too much; counts one more message."""
+        self._tokens = min(_BURST, self._tokens + (now - self.sign) * _PER_SECOND)
+        self.sign = now
+        self._tokens -= 1
+        return self._tokens >= 0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a participant does in the next step, and when they were shown the picture and acted."""
+
+    action: Action
+    connection: int
+    shown: float
+    acted: float
+    movement: str | None
+    said: str | None
+
+
+@dataclass
+class Running:
+    """A game as it is played now.
+
+    Attributes:
+        episode: the present one. chosen: of each seat of a person who has chosen. since: when the first one did.
+        ready: participants who want to go on after the end of an episode. ended: when it ended.
+    """
+
+    episode: Episode
+    chosen: dict[Seat, Choice] = field(default_factory=dict)
+    since: float | None = None
+    ready: set[str] = field(default_factory=set)
+    ended: float | None = None
+
+
+TAKEN: Final = 4409
+FAST: Final = 4429
+
+
+class Live:
+    """A study with all its participants.
+
+    Args:
+        loaded: the study. folder: holds its log and everything else that is stored; it is there.
+        clock: seconds that never go back.
+
+    Attributes:
+        progress: where everybody is.
+        pages: id of a participant -> the page that is open.
+
+    Raises:
+        OSError: the folder cannot be written.
+        UsageError: it holds another study, or this one as it was before a scenario or the file was changed.
+    """
+
+    def __init__(
+        self, loaded: LoadedStudy, folder: Path, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._loaded, self._study, self._clock = loaded, loaded.study, clock
+        self._file = folder / FILE
+        self.arenas = {
+            number: Arena(one, self._tell(number), loaded.study.language)
+            for number, one in loaded.played.items()
+        }
+        self.pages: dict[str, Page] = {}
+        self._running: dict[str, Running] = {}
+        self._waiting: dict[int, dict[str, float]] = {}
+        self._markdown = MarkdownIt("commonmark", {"html": False, "breaks": False})
+        self.progress = Progress(loaded)
+        self._began = clock()
+        if self._file.exists() and self._file.stat().st_size:
+            self._read()
+        self._log = Log(self._file)
+        if not self._events:
+            self._do("study", **self._header())
+        self._do("server")
+        self._mend()
+
+    def _tell(self, number: int) -> Any:
+        if number == PRACTICE:
+            return None if self._study.practice is None else self._study.practice.tell
+        return self._study.blocks[number].tell
+
+    _events = 0
+
+    def _read(self) -> None:
+        """Be where the log says."""
+        self.progress, self._events = Progress(self._loaded), 0
+        for event in read_log(self._file):
+            if event["event"] == "study":
+                self._check(event)
+            self.progress.apply(event)
+            self._events += 1
+
+    def _mend(self) -> None:
+        """Begin what was to begin when the server died."""
+        for game in self.progress.games.values():
+            if game.episode is None:
+                self._next_episode(game)
+
+    def _header(self) -> dict[str, Any]:
+        return header_of(self._loaded, self.arenas)
+
+    def _check(self, event: Event) -> None:
+        """See that the log is of this study as it is now. Raises UsageError."""
+        own = self._header()
+        if event["study"] != own["study"]:
+            raise UsageError(f"{self._file}: holds the study {event['study']!r}, expected {own['study']!r}")
+        changed = [name for name, sha in own["programs"].items() if event["programs"].get(name) != sha]
+        if changed:
+            raise UsageError(
+                f"{self._file}: was begun with another version of {', '.join(sorted(set(changed)))}; what people have "
+                "played and what they would play must not differ. Take the change back, or begin a new study with --out"
+            )
+        if event["digest"] != own["digest"]:
+            raise UsageError(
+                f"{self._file}: was begun with another text of {self._loaded.resolved.path.name} or of its pages. Take "
+                "the change back, or begin a new study with --out"
+            )
+
+    # -- events -----------------------------------------------------------------------------------------------
+
+    def _do(self, kind: str, **more: Any) -> Event:
+        """Let something happen: it is applied at once, and shown once it is stored."""
+        event = self._log.add(kind, **more)
+        self.progress.apply(event)
+        self._events += 1
+        return event
+
+    async def _show(self, people: Iterable[str]) -> None:
+        """Show people where they are once everything that led there is stored."""
+        pages = [self.pages[person] for person in dict.fromkeys(people) if person in self.pages]
+        screens = [(page, self.screen(page)) for page in pages]
+        try:
+            await self._log.flushed()
+        except OSError:
+            self._forget()
+            for page in tuple(self.pages.values()):
+                page.send({**self.screen(page), "notice": "disk"})
+            return
+        for page, screen in screens:
+            page.send(screen)
+
+    def _forget(self) -> None:
+        """Be where the disk says, after something could not be stored."""
+        self._running.clear()
+        self._waiting.clear()
+        self._read()
+        for page in self.pages.values():
+            page.knows = None
+        self._mend()
+        for person in self.progress.people.values():
+            self._enter(person)
+
+    async def close(self) -> None:
+        """Store what is left, and let the log go."""
+        with suppress(OSError):
+            await self._log.flushed()
+        self._log.close()
+
+    # -- who comes and goes -----------------------------------------------------------------------------------
+
+    async def join(self) -> str:
+        """A new participant, by id.
+
+        Raises:
+            OSError: that cannot be stored.
+        """
+        number = len(self.progress.people) + 1
+        person = f"p{number:04d}"
+        self._do("joined", participant=person, number=number)
+        try:
+            await self._log.flushed()
+        except OSError:
+            self._forget()
+            raise
+        return person
+
+    async def come(
+        self, person: str, send: Callable[[Screen], None], leave: Callable[[int, str], None]
+    ) -> Page:
+        """Let a participant's page take part; one that was open before is closed."""
+        former = self.pages.get(person)
+        if former is not None:
+            former.leave(TAKEN, "")
+        connection = self.progress.people[person].connections + 1
+        page = self.pages[person] = Page(person, send, leave, connection, self._clock())
+        self._do("came", participant=person, connection=connection)
+        self._enter(self.progress.people[person])
+        await self._show([person])
+        return page
+
+    def go(self, page: Page) -> None:
+        """Let a page go, which was closed."""
+        if self.pages.get(page.person) is page:
+            del self.pages[page.person]
+            self._do("left", participant=page.person, connection=page.connection)
+
+    def is_there(self, person: str, away: float) -> bool:
+        """Whether a participant has an open page that was heard in the last so many seconds."""
+        page = self.pages.get(person)
+        if page is None:
+            return self._clock() - self._began < away  # after a new start pages come back by themselves
+        return self._clock() - page.sign < away
+
+    # -- what pages ask for -----------------------------------------------------------------------------------
+
+    async def hear(self, page: Page, content: str | bytes) -> None:
+        """Take a message of a page."""
+        if self.pages.get(page.person) is not page:
+            return
+        if not page.may_speak(self._clock()):
+            page.leave(FAST, "")
+            return
+        message = parsed(content)
+        if isinstance(message, Beat):
+            return
+        person = self.progress.people[page.person]
+        others: Iterable[str] = ()
+        if message is not None and message.on == self._on(person):
+            others = self._taken(person, page, message)
+        await self._show([person.id, *others])
+
+    def _taken(self, person: Participant, page: Page, message: Go | Decline | Act | Answers) -> Iterable[str]:
+        """Do what a message asks for if the screen has it; who else sees something new."""
+        stage, _ = self.progress.stage(person)
+        match message, stage:
+            case Go(), "consent" if not self.progress.full():
+                self._do("agreed", participant=person.id, group=self.progress.next_group())
+                self._enter(person)
+            case Decline(), "consent":
+                self._do("declined", participant=person.id)
+            case Go(), "page":
+                self._do("read", participant=person.id)
+                self._enter(person)
+            case Answers(), "asked":
+                answers = self._answered(person, message)
+                if answers is not None:
+                    self._do("answered", participant=person.id, answers=answers)
+                    self._enter(person)
+            case Act(), "play" if person.game is not None:
+                return self._act(person, page, message)
+            case Go(), "play" if person.game is not None:
+                return self._ready(person)
+        return ()
+
+    def _answered(self, person: Participant, message: Answers) -> dict[str, str | int] | None:
+        """Answers that fit the questions; None if some do not."""
+        asked = {question.id: question for question in self._questions(person)}
+        if set(message.answers) - set(asked):
+            return None
+        for name, question in asked.items():
+            answer = message.answers.get(name)
+            if answer is None or answer == "":
+                if not question.optional:
+                    return None
+            elif not _fits(question, answer):
+                return None
+        return {name: answer for name, answer in message.answers.items() if answer != ""}
+
+    def _questions(self, person: Participant) -> tuple[Question, ...]:
+        _, block = self.progress.stage(person)
+        return self._study.questions if block == PRACTICE else self._study.blocks[block].questions
+
+    # -- games ------------------------------------------------------------------------------------------------
+
+    def _enter(self, person: Participant) -> None:
+        """Let a participant begin what comes now: a game for one begins at once, for several they wait."""
+        stage, block = self.progress.stage(person)
+        if stage != "play" or person.game is not None:
+            return
+        if block == PRACTICE or len(persons_of(self._study.blocks[block])) == 1:
+            self._begin(block, [person.id])
+        elif person.id in self.pages:
+            self._waiting.setdefault(block, {}).setdefault(person.id, self._clock())
+
+    def _begin(self, block: int, people: list[str]) -> Game:
+        number = len(self.progress.games) + 1
+        seats = self.progress.seating(block, people)
+        self._do("game", game=f"g{number}", block=block, seats=seats)
+        game = self.progress.games[f"g{number}"]
+        self._next_episode(game)
+        return game
+
+    def _next_episode(self, game: Game) -> None:
+        number = len(game.results)
+        self._drop(game)
+        self._do("episode", game=game.id, number=number, room=self.progress.rooms(game)[number])
+        self._running_of(game)
+
+    def _drop(self, game: Game) -> None:
+        """Give back what a game was played in."""
+        running = self._running.pop(game.id, None)
+        if running is not None:
+            self.arenas[game.block].give(running.episode.env)
+
+    def _running_of(self, game: Game) -> Running:
+        """A game as it is played now; after a new start it is played again as far as it was."""
+        found = self._running.get(game.id)
+        if found is None:
+            arena, played = self.arenas[game.block], game.episode
+            assert played is not None, "internal: a game begins with an episode"
+            env = arena.take()
+            episode = Episode(arena, self._policies(game, env), reset_of(game.block, played.room), env)
+            for step in played.steps:
+                episode.step(step["acts"])
+            found = self._running[game.id] = Running(episode)
+            if episode.ending is not None and played.ended is None:  # the server died in between
+                self._end(game, found)
+        return found
+
+    def _policies(self, game: Game, env: Any) -> dict[Seat, Any]:
+        """The trained agents on seats."""
+        named = {seat: who for seat, who in game.seats.items() if who not in (*WHO, *self.progress.people)}
+        if not named:
+            return {}
+        from socialai_dsl.episodes.players import Player, make_policy, require_trainer
+
+        require_trainer()
+        folder = self._loaded.folder
+        paths = {seat: who if who.startswith(PREFIX) else str(folder / who) for seat, who in named.items()}
+        return {seat: make_policy(Player(path), env)[0] for seat, path in paths.items()}
+
+    def _act(self, person: Participant, page: Page, message: Act) -> Iterable[str]:
+        game = self.progress.games[person.game or ""]
+        running = self._running_of(game)
+        seat = self.progress.seat_of(game, person.id)
+        if running.episode.ending is not None or seat in running.chosen:
+            return ()
+        try:
+            action = self.arenas[game.block].action(running.episode.rooms, message.movement, message.said)
+        except ValueError:
+            return ()
+        running.chosen[seat] = Choice(
+            action, page.connection, message.shown, message.acted, message.movement, message.said
+        )
+        return self._advance(game)
+
+    def _persons(self, game: Game) -> dict[Seat, str]:
+        """The participants who have a seat and have not left it."""
+        people = self.progress.people
+        return {seat: who for seat, who in game.seats.items() if who in people and who not in game.gone}
+
+    def _advance(self, game: Game, late: bool = False) -> Iterable[str]:
+        """Play the step if nobody is waited for any more; who sees something new."""
+        running, persons = self._running_of(game), self._persons(game)
+        if running.episode.ending is not None or not running.chosen:
+            return ()
+        if not late and any(seat not in running.chosen for seat in persons):
+            running.since = running.since or self._clock()
+            return ()
+        episode = running.episode
+        acts: dict[Seat, Action | None] = {}
+        by: dict[Seat, str] = {}
+        times: dict[Seat, dict[str, Any]] = {}
+        stands_in = "script" if game.block == PRACTICE else self._study.blocks[game.block].stands_in
+        for seat in episode.arena.seats:
+            choice, who = running.chosen.get(seat), game.seats.get(seat, "script")
+            if choice is not None:
+                acts[seat], by[seat] = choice.action, "person"
+                times[seat] = {
+                    "connection": choice.connection,
+                    "shown": choice.shown,
+                    "acted": choice.acted,
+                    "movement": choice.movement,
+                    "said": choice.said,
+                }
+                continue
+            by[seat] = stands_in if who in self.progress.people else who
+            acts[seat] = episode.chosen(seat, by[seat], f"{game.id} {len(game.results)}")
+        self._do("step", game=game.id, episode=len(game.results), t=episode.t, acts=acts, by=by, times=times)
+        episode.step(acts)
+        running.chosen, running.since = {}, None
+        if episode.ending is not None:
+            self._end(game, running)
+        return persons.values()
+
+    def _end(self, game: Game, running: Running) -> None:
+        ending = running.episode.ending
+        assert ending is not None, "internal: the episode has ended"
+        running.ended = self._clock()
+        self._do(
+            "ended",
+            game=game.id,
+            episode=len(game.results),
+            t=running.episode.t,
+            outcome=ending.outcome,
+            success=ending.success,
+            returns=ending.returns,
+        )
+
+    def _ready(self, person: Participant) -> Iterable[str]:
+        """Go on after the end of an episode, when all want to."""
+        game = self.progress.games[person.game or ""]
+        if game.episode is None or game.episode.ended is None:
+            return ()
+        if self.progress.is_over(game):
+            self._do("finished", participant=person.id, game=game.id, passed=self.progress.passed(game))
+            if all(self.progress.people[who].game != game.id for who in self._persons(game).values()):
+                self._drop(game)
+            self._enter(person)
+            return ()
+        running = self._running_of(game)
+        running.ready.add(person.id)
+        persons = self._persons(game)
+        if set(persons.values()) <= running.ready:
+            self._next_episode(game)
+        return persons.values()
+
+    async def tick(self) -> None:
+        """Do what time asks for: match those who wait, let others stand in for those who have left or are late."""
+        told: list[str] = []
+        for block, waiting in self._waiting.items():
+            told += self._match(block, waiting)
+        for game in tuple(self.progress.games.values()):
+            if game.block != PRACTICE and len(persons_of(self._study.blocks[game.block])) > 1:
+                told += self._watch(game)
+        if told:
+            await self._show(told)
+
+    def _match(self, block: int, waiting: dict[str, float]) -> list[str]:
+        study, now = self._study.blocks[block], self._clock()
+        for person in [one for one in waiting if not (one in self.pages and self.is_there(one, study.away))]:
+            del waiting[person]  # nobody plays with who is not there
+        told: list[str] = []
+        count = len(persons_of(study))
+        while waiting:
+            people = list(waiting)[:count]
+            if len(people) < count and now - waiting[people[0]] < study.wait:
+                break
+            for person in people:
+                del waiting[person]
+            self._begin(block, people)
+            told += people
+        return told
+
+    def _watch(self, game: Game) -> list[str]:
+        """See who has left a game and who is back, and go on without who is late."""
+        study, now = self._study.blocks[game.block], self._clock()
+        if self.progress.is_over(game):
+            return []
+        told: list[str] = []
+        for who in game.seats.values():
+            if who not in self.progress.people:
+                continue
+            there = self.is_there(who, study.away)
+            if not there and who not in game.gone:
+                self._do("gone", game=game.id, participant=who)
+                told += self._advance(game)
+            elif there and who in game.gone and who in self.pages:
+                self._do("back", game=game.id, participant=who)
+                told.append(who)
+        persons = self._persons(game)
+        running = self._running.get(game.id)
+        if not persons or running is None:
+            return told
+        if running.since is not None and now - running.since >= study.act_within:
+            told += self._advance(game, late=True)
+        waited = running.ended is not None and now - running.ended >= study.act_within
+        if running.ready and (waited or set(persons.values()) <= running.ready):
+            self._next_episode(game)
+            told += persons.values()
+        return told
+
+    # -- screens ----------------------------------------------------------------------------------------------
+
+    def _on(self, person: Participant) -> str:
+        """The name of the screen that a participant is at."""
+        game = self.progress.games.get(person.game or "")
+        if game is None or game.episode is None:
+            return f"{person.stage}.{person.rounds}"
+        if game.episode.ended is not None:
+            return f"{game.id}.{game.episode.number}.end"
+        return f"{game.id}.{game.episode.number}.{len(game.episode.steps)}"
+
+    def screen(self, page: Page) -> Screen:
+        """What a participant's page shows now: of a room what the seat observes, and nothing else."""
+        person = self.progress.people[page.person]
+        stage, number = self.progress.stage(person)
+        if person.game is not None:
+            self._running_of(self.progress.games[person.game])  # which may find that an episode has ended
+        on = {"on": self._on(person)}
+        match stage:
+            case "consent":
+                return {
+                    "do": "consent",
+                    **on,
+                    "html": self._html(self._loaded.consent),
+                    "full": self.progress.full(),
+                }
+            case "page":
+                pages = self._loaded.instructions
+                return {
+                    "do": "page",
+                    **on,
+                    "html": self._html(pages[number]),
+                    "number": number + 1,
+                    "of": len(pages),
+                }
+            case "asked":
+                asked = [question.model_dump(by_alias=True) for question in self._questions(person)]
+                return {"do": "asked", **on, "questions": asked}
+            case "play" if person.game is not None:
+                return self._play_screen(person, page) | on
+            case "play":
+                study = self._study.blocks[number]
+                waited = self._clock() - self._waiting.get(number, {}).get(person.id, self._clock())
+                return {"do": "room", **on, "seconds": max(0, round(study.wait - waited))}
+        return {"do": "end", **on, **self._end_screen(person)}
+
+    def _end_screen(self, person: Participant) -> Screen:
+        if person.declined:
+            return {"declined": True}
+        end, pay = self._study.end, self._study.pay
+        paid = None
+        if pay is not None:
+            paid = {"sum": f"{pay.base + self.progress.bonus(person):.2f}", "currency": pay.currency}
+        say = "" if end.say is None else self._html(end.say)
+        return {"declined": False, "code": end.code, "html": say, "link": end.link, "paid": paid}
+
+    def _play_screen(self, person: Participant, page: Page) -> Screen:
+        game = self.progress.games[person.game or ""]
+        running = self._running_of(game)
+        episode, played = running.episode, game.episode
+        assert played is not None, "internal: a game begins with an episode"
+        seat = self.progress.seat_of(game, person.id)
+        practice = game.block == PRACTICE
+        block = None if practice else self._study.blocks[game.block]
+        ended = episode.ending is not None
+        seen = episode.picture(seat)
+        if block is not None and block.view == "picture":
+            del seen["seen"]
+        elif block is not None and block.view == "words":
+            del seen["view"]
+        if ended and block is not None and block.feedback == "none":
+            seen.pop("seen", None)  # whose last line says how it ended
+        found: Screen = {
+            "do": "play",
+            "practice": practice,
+            "episode": played.number + 1,
+            "episodes": len(self.progress.rooms(game)),
+            "t": episode.t,
+            "told": episode.told(seat),
+            "heard": episode.heard[seat][-MOST_LINES:],
+            "waiting": seat in running.chosen or person.id in running.ready,
+            **seen,
+        }
+        if ended:
+            assert episode.ending is not None, "internal: the episode has ended"
+            told = practice or (block is not None and block.feedback == "outcome")
+            found |= {"ended": True, "success": episode.ending.success[seat] if told else None}
+        if page.knows != game.id:
+            page.knows = game.id
+            arena = self.arenas[game.block]
+            found |= {"actions": list(arena.actions), "phrases": arena.phrases}
+        return found
+
+    def _html(self, text: str) -> str:
+        """Markdown as HTML, in which tags are shown as they are written."""
+        made: str = self._markdown.render(text)
+        for number, name in enumerate(self._loaded.pictures):
+            made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
+        return made
+
+
+def reset_of(block: int, room: int) -> dict[str, Any]:
+    """The arguments of `env.reset` for a room of a block."""
+    return {"seed": room} if block == PRACTICE else {"options": {"test_episode": [room]}}
+
+
+def header_of(loaded: LoadedStudy, arenas: dict[int, Arena]) -> dict[str, Any]:
+    """What the first event of a log says of the study."""
+    words = [loaded.study.model_dump(mode="json"), loaded.consent, loaded.instructions]
+    digest = hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
+    programs = {loaded.played[number].name: arena.program.sha256 for number, arena in arenas.items()}
+    return {"format": FORMAT, "study": loaded.study.study, "digest": digest, "programs": programs}
+
+
+def _fits(question: Question, answer: str | int) -> bool:
+    match question.kind:
+        case "text":
+            return isinstance(answer, str)
+        case "choice":
+            return answer in (question.options or ())
+    assert question.start is not None, "internal: scales have been checked"
+    assert question.to is not None, "internal: scales have been checked"
+    return isinstance(answer, int) and question.start <= answer <= question.to

@@ -1,0 +1,82 @@
+"""What a participant's page may send, checked where it arrives; everything else is refused."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+LARGEST: Final = 65_536
+"""Bytes of a message that is read at all."""
+
+_Screen = Annotated[str, Field(max_length=80)]
+_Milliseconds = Annotated[float, Field(ge=0, le=1e10)]
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class Beat(_Message):
+    """Say that the page is there."""
+
+    do: Literal["beat"]
+
+
+class Go(_Message):
+    """Go on from a screen: agree, turn a page, or begin the next episode.
+
+    Attributes:
+        on: the screen that is meant; of one that is gone nothing follows.
+    """
+
+    do: Literal["go"]
+    on: _Screen
+
+
+class Decline(_Message):
+    """Do not agree."""
+
+    do: Literal["decline"]
+    on: _Screen
+
+
+class Act(_Message):
+    """Move, speak, or both.
+
+    Attributes:
+        shown, acted: when the picture was shown and when this was chosen, milliseconds of the page's own clock.
+    """
+
+    do: Literal["act"]
+    on: _Screen
+    movement: Annotated[str, Field(max_length=40)] | None = None
+    said: Annotated[str, Field(max_length=1000)] | None = None
+    shown: _Milliseconds
+    acted: _Milliseconds
+
+
+class Answers(_Message):
+    """Answer the questions of a screen, by their names."""
+
+    do: Literal["answers"]
+    on: _Screen
+    answers: Annotated[
+        dict[Annotated[str, Field(max_length=40)], Annotated[str, Field(max_length=10_000)] | int],
+        Field(max_length=200),
+    ]
+
+
+Message = Beat | Go | Decline | Act | Answers
+_MESSAGES: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="do")])
+
+
+def parsed(content: str | bytes) -> Message | None:
+    """The message that a text is; None if it is none."""
+    try:
+        return _MESSAGES.validate_json(content)
+    except (ValidationError, UnicodeDecodeError):
+        return None
+
+
+Screen = dict[str, Any]

@@ -1,0 +1,251 @@
+"""Where everybody is in a study: a state that follows from the events of its log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
+from socialai_dsl.semantics.study import least_filled, shuffled
+from socialai_dsl.study.log import Event
+
+PRACTICE_SEED: Final = 1_000_000
+"""The first room of practice, which no test set has."""
+
+Stage = tuple[str, int]
+"""What a participant does: `consent`, `page` with its number, `play` with that of a block or `PRACTICE`, `asked` with
+that of a block or -1 for the questions at the end, `end`."""
+
+
+@dataclass
+class Played:
+    """An episode of a game.
+
+    Attributes:
+        number: in the game, from 0. room: of the test set, or in practice a seed.
+        steps: what was done, see the event `step`; until everybody has gone on from the game.
+        ended: the event that says how it ended.
+    """
+
+    number: int
+    room: int
+    steps: list[Event] = field(default_factory=list)
+    ended: Event | None = None
+
+
+@dataclass
+class Game:
+    """Those who play a block together.
+
+    Attributes:
+        id: of the game. block: its number, or `PRACTICE`.
+        seats: of each seat who has it: a participant's id, or a word that is no participant's.
+        gone: participants who have left, whose seats somebody else plays.
+        episode: the present one. results: the successes of each seat in the episodes that have ended.
+    """
+
+    id: str
+    block: int
+    seats: dict[str, str]
+    gone: set[str] = field(default_factory=set)
+    episode: Played | None = None
+    results: list[Mapping[str, bool]] = field(default_factory=list)
+
+
+@dataclass
+class Participant:
+    """Somebody who takes part.
+
+    Attributes:
+        id: in the data. number: of those who have joined, from 1.
+        stage: index of what they do now. group: from 1; None before they agree.
+        declined: whether they did not agree. game: that they play. rounds: of practice that have ended.
+        practised: whether they reached the criterion. won: successes that count. answered: questions.
+        connections: how often their page has been opened. since: time of their last event.
+    """
+
+    id: str
+    number: int
+    stage: int = 0
+    group: int | None = None
+    declined: bool = False
+    game: str | None = None
+    rounds: int = 0
+    practised: bool | None = None
+    won: int = 0
+    answered: int = 0
+    connections: int = 0
+    began: str | None = None
+    ended: str | None = None
+    since: str | None = None
+
+
+class Progress:
+    """All participants and games of a study.
+
+    Args:
+        loaded: the study.
+
+    Attributes:
+        people: id -> participant. games: id -> game.
+    """
+
+    def __init__(self, loaded: LoadedStudy) -> None:
+        self.loaded, self.study = loaded, loaded.study
+        self.people: dict[str, Participant] = {}
+        self.games: dict[str, Game] = {}
+
+    # -- what follows from the file -------------------------------------------------------------------------------
+
+    def stages(self, person: Participant) -> list[Stage]:
+        """What a participant does, one after another; before they agree only what comes first."""
+        study = self.study
+        found: list[Stage] = [("consent", 0)]
+        if person.group is None:
+            return [*found, ("end", 0)]
+        found += [("page", number) for number in range(len(study.instructions))]
+        found += [("play", PRACTICE)] if study.practice is not None else []
+        for number in self.loaded.design.orders[person.group - 1]:
+            found.append(("play", number))
+            found += [("asked", number)] if study.blocks[number].questions else []
+        found += [("asked", PRACTICE)] if study.questions else []
+        return [*found, ("end", 0)]
+
+    def stage(self, person: Participant) -> Stage:
+        """What a participant does now."""
+        return self.stages(person)[person.stage]
+
+    def rooms(self, game: Game) -> tuple[int, ...]:
+        """The rooms that a game plays, in this order; of practice those of the present round."""
+        study = self.study
+        first = next(who for who in game.seats.values() if who in self.people)
+        person = self.people[first]
+        if game.block == PRACTICE:
+            assert study.practice is not None, "internal: there is practice"
+            start = PRACTICE_SEED + person.rounds * study.practice.episodes
+            return tuple(range(start, start + study.practice.episodes))
+        rooms = self.loaded.design.rooms[game.block]
+        return (
+            shuffled(rooms, study.study, game.block, person.number)
+            if study.blocks[game.block].shuffle
+            else rooms
+        )
+
+    def full(self) -> bool:
+        """Whether as many have agreed to take part as may."""
+        most = self.study.participants
+        return most is not None and sum(p.group is not None for p in self.people.values()) >= most
+
+    def next_group(self) -> int:
+        """The group of whoever agrees next, from 1."""
+        counts = [0] * len(self.loaded.design.orders)
+        for person in self.people.values():
+            if person.group is not None:
+                counts[person.group - 1] += 1
+        return least_filled(counts) + 1
+
+    def seating(self, block: int, people: list[str]) -> dict[str, str]:
+        """Who sits where in a new game: people on the seats for them, each pair the other way round than the last."""
+        if block == PRACTICE:
+            return {"agent": people[0]}
+        seats, persons = seats_of(self.study.blocks[block]), persons_of(self.study.blocks[block])
+        before = sum(game.block == block for game in self.games.values())
+        turned = [*persons[before % len(persons) :], *persons[: before % len(persons)]]
+        stands_in = self.study.blocks[block].stands_in
+        taken = dict(zip(turned, people, strict=False))
+        return {seat: taken.get(seat, stands_in if who == "person" else who) for seat, who in seats.items()}
+
+    def is_over(self, game: Game) -> bool:
+        """Whether all episodes of a game have ended."""
+        return len(game.results) >= len(self.rooms(game))
+
+    def seat_of(self, game: Game, person: str) -> str:
+        """The seat that a participant has in a game."""
+        return next(seat for seat, who in game.seats.items() if who == person)
+
+    def passed(self, game: Game) -> bool:
+        """Whether a round of practice reached the criterion, or there is none."""
+        practice = self.study.practice
+        if practice is None or practice.until is None:
+            return True
+        won = sum(result["agent"] for result in game.results)
+        return won >= practice.until.success * practice.episodes
+
+    def bonus(self, person: Participant) -> float:
+        """What a participant is paid for success, besides the base."""
+        return 0.0 if self.study.pay is None else person.won * self.study.pay.bonus
+
+    # -- what follows from an event -------------------------------------------------------------------------------
+
+    def apply(self, event: Event) -> None:
+        """Go on by an event."""
+        kind, person = event["event"], self.people.get(event.get("participant", ""))
+        if person is not None:
+            person.since = event["time"]
+        match kind:
+            case "joined":
+                self.people[event["participant"]] = Participant(
+                    event["participant"], event["number"], since=event["time"]
+                )
+            case "agreed" if person is not None:
+                person.group, person.stage, person.began = event["group"], 1, event["time"]
+            case "declined" if person is not None:
+                person.declined, person.stage = True, 1
+            case "came" if person is not None:
+                person.connections = event["connection"]
+            case "answered" if person is not None:
+                person.answered += len(event["answers"])
+                self._next(person, event)
+            case "read" if person is not None:
+                self._next(person, event)
+            case "finished" if person is not None:  # with a block or a round of practice
+                self._finish(person, event)
+            case _:
+                self._play(event)
+
+    def _next(self, person: Participant, event: Event) -> None:
+        person.stage += 1
+        if self.stage(person)[0] == "end":
+            person.ended = event["time"]
+
+    def _finish(self, person: Participant, event: Event) -> None:
+        person.game = None
+        game = self.games[event["game"]]
+        if game.episode is not None and all(
+            p.game != game.id for p in map(self.people.get, game.seats.values()) if p
+        ):
+            game.episode.steps = []
+        if self.stage(person) == ("play", PRACTICE):
+            person.rounds += 1
+            person.practised = event["passed"]
+            assert self.study.practice is not None, "internal: there is practice"
+            if not event["passed"] and person.rounds < self.study.practice.rounds:
+                return
+        self._next(person, event)
+
+    def _play(self, event: Event) -> None:
+        match event["event"]:
+            case "game":
+                game = self.games[event["game"]] = Game(event["game"], event["block"], dict(event["seats"]))
+                for who in game.seats.values():
+                    if who in self.people:
+                        self.people[who].game = game.id
+            case "episode":
+                self.games[event["game"]].episode = Played(event["number"], event["room"])
+            case "step":
+                episode = self.games[event["game"]].episode
+                assert episode is not None, "internal: a step is one of an episode"
+                episode.steps.append(event)
+            case "ended":
+                game = self.games[event["game"]]
+                assert game.episode is not None, "internal: what ends has begun"
+                game.episode.ended = event
+                game.results.append(event["success"])
+                for seat, who in game.seats.items():
+                    if game.block != PRACTICE and who in self.people and who not in game.gone:
+                        self.people[who].won += bool(event["success"].get(seat))
+            case "gone":
+                self.games[event["game"]].gone.add(event["participant"])
+            case "back":
+                self.games[event["game"]].gone.discard(event["participant"])

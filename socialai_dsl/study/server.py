@@ -1,0 +1,256 @@
+"""The server of a study: a secret link for each participant, one page, and a websocket on which the server decides."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import csv
+import hmac
+import json
+import logging
+import os
+import secrets
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any, Final
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from socialai_dsl.atomic import write_text
+from socialai_dsl.checking.studies import PICTURES, LoadedStudy
+from socialai_dsl.study.live import Live
+from socialai_dsl.study.words import words_of
+from socialai_dsl.web.connection import close, contents, send
+from socialai_dsl.web.pages import Address, guarded, page, static_file
+
+KEY: Final = "key"
+RECRUITED: Final = "recruited.csv"
+UNKNOWN: Final = 4404
+_TICK: Final = 0.25
+_MOST_JOINING: Final = 200
+"""How many may join at once; after that as many in a second."""
+_MOST_WAITING: Final = 64
+"""Screens that wait to be sent to a page; one that reads none of so many is closed."""
+_OWN: Final = ("old.js", "study.css", "study.js")
+
+
+class StudyServer:
+    """The server of a study.
+
+    Args:
+        loaded: the study. folder: holds everything that is stored. host: the address that is listened at.
+        public: what a proxy is asked for, such as `https://study.example.org`.
+        clock: seconds that never go back, by which others are waited for.
+
+    Attributes:
+        live: the study as it goes on.
+
+    Raises:
+        OSError: the folder cannot be written.
+        UsageError: it holds another study, see `Live`.
+    """
+
+    def __init__(
+        self,
+        loaded: LoadedStudy,
+        folder: Path,
+        host: str,
+        public: str | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._loaded, self._folder = loaded, folder
+        self._words = words_of(loaded.study.language)
+        self._address = Address(host, public)
+        self.live = Live(loaded, folder, clock)
+        self._key = _key(folder / KEY)
+        self._recruited = _recruited(folder / RECRUITED)
+        self._codes = {self.code(person): person for person in self.live.progress.people}
+        self._may_join = float(_MOST_JOINING)
+        self.app = Starlette(
+            routes=[
+                Route("/", self._front),
+                Route("/join", self._join),
+                Route("/p/{code}", self._page),
+                Route("/static/{name}", self._static),
+                Route("/picture/{number:int}", self._picture),
+                WebSocketRoute("/seat/{code}", self._seat),
+            ],
+            lifespan=self._lifespan,
+        )
+
+    def code(self, person: str) -> str:
+        """The secret of a participant's link."""
+        return hmac.new(self._key, person.encode(), "sha256").hexdigest()[:40]
+
+    def person(self, code: str) -> str:
+        """The participant whose link has this secret."""
+        return self._codes[code]
+
+    async def invite(self) -> str:
+        """The path of the link of a new participant. Raises OSError where that cannot be stored."""
+        person = await self.live.join()
+        code = self.code(person)
+        self._codes[code] = person
+        return f"/p/{code}"
+
+    @contextlib.asynccontextmanager
+    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        del app
+        logging.getLogger("uvicorn.error").addFilter(_is_failure)
+        for arena in self.live.arenas.values():
+            arena.warm(8)
+        ticking = asyncio.create_task(self._tick())
+        yield
+        ticking.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await ticking
+        await self.live.close()
+
+    async def _tick(self) -> None:
+        while True:
+            await asyncio.sleep(_TICK)
+            self._may_join = min(_MOST_JOINING, self._may_join + _MOST_JOINING * _TICK)
+            await self.live.tick()
+
+    # -- pages -----------------------------------------------------------------------------------------------
+
+    async def _front(self, request: Request) -> Response:
+        return self._said("unknown", 404) if self._is_ours(request) else _refused()
+
+    async def _join(self, request: Request) -> Response:
+        """Give whoever comes from a platform a link of their own."""
+        if not self._is_ours(request):
+            return _refused()
+        recruit = self._loaded.study.recruit
+        given = request.query_params.get(recruit.id, "")[:200]
+        known = self._recruited.get(given) if given else None
+        if known is not None:
+            if recruit.on_return == "refuse":
+                return self._said("again", 403)
+            return _to(f"/p/{self.code(known)}")
+        if self.live.progress.full():
+            return self._said("full", 403)
+        if self._may_join < 1:
+            return self._said("fast", 429)
+        self._may_join -= 1
+        path = await self.invite()
+        if given:
+            self._remember(given, self._codes[path.removeprefix("/p/")])
+        return _to(path)
+
+    def _remember(self, given: str, person: str) -> None:
+        """Keep a platform's id, apart from the data."""
+        self._recruited[given] = person
+        with open(self._folder / RECRUITED, "a", encoding="utf-8", newline="", opener=_private) as file:
+            csv.writer(file).writerow((person, given))
+            file.flush()
+            os.fsync(file.fileno())
+
+    async def _page(self, request: Request) -> Response:
+        if not self._is_ours(request):
+            return _refused()
+        if request.path_params["code"] not in self._codes:
+            return self._said("unknown", 404)
+        words = self._words
+        return page(
+            "study.js",
+            "study.css",
+            words["title"],
+            words["script"],
+            self._loaded.study.language,
+            older="old.js",
+            words=json.dumps(words, ensure_ascii=False),
+        )
+
+    async def _static(self, request: Request) -> Response:
+        return static_file(request.path_params["name"], _OWN, Path(__file__).parent / "static")
+
+    async def _picture(self, request: Request) -> Response:
+        number, shown = request.path_params["number"], list(self._loaded.pictures.values())
+        if not self._is_ours(request) or number >= len(shown):
+            return PlainTextResponse("there is no such picture", 404)
+        return guarded(FileResponse(shown[number], media_type=PICTURES[shown[number].suffix.lower()]))
+
+    def _said(self, word: str, status: int) -> Response:
+        return guarded(PlainTextResponse(self._words[word], status))
+
+    def _is_ours(self, request: Request) -> bool:
+        return self._address.is_own(request.headers.get("host"))
+
+    # -- websockets ------------------------------------------------------------------------------------------
+
+    async def _seat(self, socket: WebSocket) -> None:
+        """Let a participant's page take part until the connection ends."""
+        if not self._address.comes_from_us(socket.headers.get("host"), socket.headers.get("origin")):
+            await close(socket, 1008)
+            return
+        await socket.accept()
+        person = self._codes.get(socket.path_params["code"])
+        if person is None:
+            await close(socket, UNKNOWN)
+            return
+        screens: asyncio.Queue[str] = asyncio.Queue()
+        closing: set[asyncio.Task[None]] = set()
+
+        def leave(code: int, why: str) -> None:
+            closing.add(asyncio.get_running_loop().create_task(close(socket, code, why)))
+
+        def show(screen: dict[str, Any]) -> None:
+            if screens.qsize() >= _MOST_WAITING:
+                leave(1008, "")
+                return
+            screens.put_nowait(json.dumps(screen, ensure_ascii=False, separators=(",", ":")))
+
+        async def write() -> None:
+            while True:
+                await send(socket, await screens.get())
+
+        writing = asyncio.create_task(write())
+        own = await self.live.come(person, show, leave)
+        try:
+            async for content in contents(socket):
+                await self.live.hear(own, content)
+        finally:
+            writing.cancel()
+            self.live.go(own)
+
+
+def _to(path: str) -> Response:
+    return guarded(RedirectResponse(path, 303))
+
+
+def _refused() -> Response:
+    return guarded(PlainTextResponse("This is not the address of the study.", 403))
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
+
+
+def _key(file: Path) -> bytes:
+    """The secret that links are made from, the same as long as the folder is there."""
+    try:
+        return bytes.fromhex(file.read_text(encoding="ascii").strip())
+    except FileNotFoundError:
+        made = secrets.token_bytes(32)
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        os.close(descriptor)
+        write_text(file, made.hex() + "\n")  # which keeps these permissions
+        return made
+
+
+def _recruited(file: Path) -> dict[str, str]:
+    """Platforms' ids -> participants."""
+    if not file.exists():
+        return {}
+    with open(file, encoding="utf-8", newline="") as stream:
+        return {row[1]: row[0] for row in csv.reader(stream) if len(row) == 2}
+
+
+def _is_failure(record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], UnicodeDecodeError))

@@ -1,0 +1,1 @@
+"""What every server of pages needs: connections, the skeleton of pages with their guards, and who may ask."""

@@ -1,0 +1,3 @@
+from tests.socialai_dsl.study.participants import place
+
+__all__ = ["place"]
