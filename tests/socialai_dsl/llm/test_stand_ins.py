@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from math import isnan
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -18,7 +19,7 @@ import socialai_dsl.llm as llm
 from socialai_dsl.checking.briefing import brief
 from socialai_dsl.envs.factory import compiled, playable_of
 from socialai_dsl.episodes.partners import beside
-from socialai_dsl.frontend import load
+from socialai_dsl.frontend import load, load_experiment
 from socialai_dsl.llm import Episode
 from tests.socialai_dsl.llm.stand_ins import OPENENV, Model, TaskState, inspect_ai
 
@@ -205,6 +206,18 @@ def test_a_limit_is_told_and_a_full_context_ends_a_sample() -> None:
         assert answer == "a conversation longer than the model's context"
     assert [len(messages) for messages in model.asked] == [2, 4, 4, 4]
     assert model.asked[-1][1].text.startswith("(2 earlier turns are left out here, ")
+
+
+@without_inspect
+def test_the_suite_is_that_of_the_published_table() -> None:
+    with imported("inspect_task", inspect_ai(Model([]))) as module:
+        published = {
+            cell.scenario
+            for cell in load_experiment(Path(__file__).parents[3] / "experiments" / "minds.yaml").cells[
+                "model"
+            ]
+        }
+        assert set(module.TEN) == published
 
 
 @without_inspect
