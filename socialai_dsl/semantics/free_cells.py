@@ -343,7 +343,7 @@ class _Room:
 
     def _region_cells(self, placing: Placing) -> tuple[set[Cell] | None, int]:
         """The cells of a place; None for a place around something that is drawn, with how many there are at least."""
-        around = [r for r in placing.regions if r.name in ("next_to", "in_front_of")]
+        around = [region for region in placing.regions if region.around]
         if around:
             return None, min(self._least_around(region) for region in around)
         found: set[Cell] = set()
@@ -378,7 +378,7 @@ class _Room:
         """Where something can be at all."""
         if placing.at is not None:
             return {(value(placing.at[0], self.size), value(placing.at[1], self.size))}
-        if any(region.name in ("next_to", "in_front_of") for region in placing.regions):
+        if any(region.around for region in placing.regions):
             return self._floor
         found: set[Cell] = set()
         for region in placing.regions:
@@ -612,7 +612,7 @@ class _DrawnRoom(PartialEvaluation):
 
     def _region(self, region: Region, overlap: bool) -> Set[Cell] | None:
         """The cells of a region; None if they are not known."""
-        if region.name in ("next_to", "in_front_of"):
+        if region.around:
             target = self.value(region.args[0])
             cell = None if target is None else self._places.get(target)
             if cell is None or region.name == "in_front_of":

@@ -48,6 +48,11 @@ class Region:
     margin: int = 1
     where: Term | None = None
 
+    @property
+    def around(self) -> bool:
+        """Whether it lies around something in the room, and so is known once that is put somewhere."""
+        return self.name in ("next_to", "in_front_of")
+
 
 @dataclass(frozen=True, slots=True)
 class Placing:

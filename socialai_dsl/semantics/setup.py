@@ -238,7 +238,7 @@ def _built_regions(
         where = resolver.value(node.where, BOOL, replace(scope, here=True))
         node = node.region
     for part in _regions(resolver, node, scope):
-        drawn = part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args)
+        drawn = part.around or (part.name == "wall" and part.args)
         if drawn or not all(map(_follows_from_size, walk((part.args, where)))):
             message = "what is built into the room depends on its size alone"
             hint = "use W and H, and `here` behind `where`; put what is drawn in `objects`"
@@ -592,7 +592,7 @@ def _needs(item: Setup) -> list[str]:
         found |= {f"cell {n}": None for n in (item.entity, *entities_of(item.toward))}
     if isinstance(item, Placing):
         for region in item.regions:
-            for term in region.args if region.name in ("next_to", "in_front_of") else ():
+            for term in region.args if region.around else ():
                 found |= {f"cell {n}": None for n in entities_of(term)}
                 if region.name == "in_front_of":
                     found |= {f"facing {n}": None for n in entities_of(term)}
