@@ -13,6 +13,7 @@ from socialai_dsl.engine import rng
 WORDS = st.integers(0, 2**64 - 1)
 
 
+@np.errstate(over="ignore")  # in plain Python, too, numbers wrap around
 @njit
 def all_draws(
     seed: np.uint64, index: np.uint64, episode: np.uint64, place: int, step: int, number: int, n: int
