@@ -416,11 +416,10 @@ RECIPES: Final[Mapping[str, Preset]] = {
     "guided": Preset(
         {
             "guide": "script",
-            "envs": 128,
-            "horizon": 64,
+            "guide_share": 0.7,
             "epochs": 2,
             "minibatches": 16,
-            "lr": 1e-3,
+            "lr": 3e-3,
             "lr_end": 1e-4,
             # The rest keeps what was imitated. Scaled to deviation 1, advantages are noise where the policy succeeds.
             "normalize_advantages": False,

@@ -40,6 +40,8 @@ _COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if words and not words[0].startswith("-") and words[0] not in _COMMANDS:
+        return _unknown_command(words[0])
     # Loading all commands doubles the time to start; the others are needed for their summaries alone.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
     modules = {name: import_module(f"socialai_dsl.cli.{name}") for name in named}
@@ -195,6 +197,12 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))
+
+
+def _unknown_command(word: str) -> Exit:
+    cure = suggested(word, _COMMANDS, "; `socialai --help` lists the commands")
+    print(f"socialai: there is no command {printable(word)}{cure}", file=sys.stderr)
+    return Exit.USAGE
 
 
 class _Completion(argparse.Action):

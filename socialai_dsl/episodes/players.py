@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing, Tell, brief
 from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.seats import NOBODY
 from socialai_dsl.episodes.play import Rooms
 from socialai_dsl.episodes.policies import (
@@ -251,6 +252,20 @@ def folder_of(agent: str) -> Path:
         raise UsageError(str(error)) from None
 
 
+def existing_folder(agent: str) -> Path:
+    """Where a trained agent is kept, see `folder_of`, or its file.
+
+    Raises:
+        UsageError: there is none.
+    """
+    folder = folder_of(agent)
+    if not folder.exists():
+        known = f"{', '.join(UNTRAINED)}, shipped, shipped:NAME, rival:NAME or llm:MODEL"
+        near = suggested(agent, UNTRAINED, f"; expected the path of a run or a checkpoint, {known}")
+        raise UsageError(f"there is no agent {agent!r}{near}")
+    return folder
+
+
 def named_agent(agent: str, scenario: str) -> str:
     """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
 
@@ -275,16 +290,21 @@ def named_agent(agent: str, scenario: str) -> str:
     raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
 
 
+def is_no_folder(agent: str) -> bool:
+    """Whether an agent is no path: a script, chance, a person, a language model, the one that ships for a scenario."""
+    return agent in (*UNTRAINED, "shipped") or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX))
+
+
 def played_again(agent: str) -> str:
     """The agent that a name or a path means; the folder of a run or an evaluation means the agent that played there.
 
     Raises:
-        UsageError: a person or a language model played there, or an agent that is not here.
+        UsageError: there is no such agent; or a person or a language model played there, or an agent that is not here.
         OSError: what the folder says cannot be read.
     """
-    if agent in UNTRAINED or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)):
+    if is_no_folder(agent):
         return agent
-    folder = folder_of(agent)
+    folder = existing_folder(agent)
     if not (folder / CONFIG).is_file() or (played := agent_of(folder)) == LEARNS:
         return agent
     if Player(played).is_person or Player(played).is_model:

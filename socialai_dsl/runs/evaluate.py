@@ -18,7 +18,9 @@ from socialai_dsl.episodes.players import (
     HUMAN_FOLDER,
     Agent,
     Player,
+    existing_folder,
     folder_of,
+    is_no_folder,
     named_agent,
     played_again,
     player_of,
@@ -319,7 +321,9 @@ def own_scenario(agent: str) -> str:
     Raises:
         UsageError: it is neither.
     """
-    run = folder_of(agent)
+    if is_no_folder(agent):
+        raise UsageError(f"{agent} plays any scenario; name one by --on, such as --on talkitout")
+    run = existing_folder(agent)
     if not (run / CONFIG).is_file():
         raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
     return scenario_of(run)

@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -255,11 +255,16 @@ def new_run_folder(out: Path | None, spec: str, seed: int) -> Iterator[Path]:
         UsageError: `out` holds a run already, or another process writes there.
         OSError: it cannot be made.
     """
+    missing = _missing(_RUNS / scenario_folder_name(spec) if out is None else out)
     folder = _fresh_folder(spec, seed) if out is None else out
-    with only_writer(folder):
-        if (folder / CONFIG).exists():
-            raise OptionError("out", f"{out} holds a run already; resume it, or choose another folder")
-        yield folder
+    try:
+        with only_writer(folder):
+            if (folder / CONFIG).exists():
+                raise OptionError("out", f"{out} holds a run already; resume it, or choose another folder")
+            yield folder
+    except Exception:
+        _remove_empty(missing)
+        raise
 
 
 def _fresh_folder(spec: str, seed: int) -> Path:
@@ -306,7 +311,7 @@ def new_folders(folder: Path) -> Iterator[set[Path]]:
     Raises:
         OSError: it cannot be made.
     """
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    missing = _missing(folder)
     folder.mkdir(parents=True, exist_ok=True)
     before, begun = set(folder.iterdir()), set[Path]()
     try:
@@ -315,7 +320,18 @@ def new_folders(folder: Path) -> Iterator[set[Path]]:
         if set(folder.iterdir()) <= before | begun:
             for path in {one for one in begun - before if one.exists()}:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with contextlib.suppress(OSError):  # it holds something else
-            for one in missing:
-                one.rmdir()
+        _remove_empty(missing)
         raise
+
+
+def _missing(folder: Path) -> list[Path]:
+    """The folders that have to be made for a folder, itself first."""
+    return [one for one in (folder, *folder.parents) if not one.exists()]
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Remove folders, the inner ones first, up to one that holds something."""
+    with contextlib.suppress(OSError):
+        for one in folders:
+            if one.exists():
+                one.rmdir()

@@ -44,7 +44,7 @@ _MOST_THREADS: Final = 4
 """More threads than this wait for Python's interpreter lock rather than compute."""
 
 _PLAIN_FRAMES: Final = 600_000
-_GUIDED_FRAMES: Final = 1_000_000
+_GUIDED_FRAMES: Final = 500_000
 _GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 _PAPER_BONUS: Final = Path(__file__).with_name("paper_bonus.yaml")
 

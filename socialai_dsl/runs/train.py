@@ -21,7 +21,7 @@ from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.episodes.partners import called, pools_of, seats_with
 from socialai_dsl.episodes.play import AGENT, Seat
-from socialai_dsl.episodes.players import Player, folder_of, named_agent, require_trainer
+from socialai_dsl.episodes.players import Player, named_agent, require_trainer
 from socialai_dsl.episodes.scripts import script_of, with_script
 from socialai_dsl.errors import OptionError, RunFailed, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
@@ -45,7 +45,7 @@ from socialai_dsl.runs.options import continued_config, new_config
 from socialai_dsl.runs.outputs import draw_curve, record_run, training_figures, write_card
 from socialai_dsl.runs.stopping import Stop
 from socialai_dsl.traces.endings import endings_of, short_name
-from trainer.config import UNTRAINED, RunConfig
+from trainer.config import LEARNS, RunConfig
 from trainer.files import checkpoint_files
 
 if TYPE_CHECKING:
@@ -53,7 +53,6 @@ if TYPE_CHECKING:
 
 _REMEMBERED_UPDATES: Final = 20
 _TOLD_OF_PARTNERS: Final = ("episodes", "success_rate", "success_interval")
-_AGENTS: Final = ("ppo", *UNTRAINED)
 
 
 @dataclass(frozen=True)
@@ -143,10 +142,8 @@ def train(
     """
     require_trainer()
     spec = str(scenario)
-    agent = named_agent(str(options.get("agent") or "ppo"), spec)
-    if agent not in _AGENTS and not folder_of(agent).exists():
-        known = ", ".join(_AGENTS)
-        raise OptionError("agent", f"expected {known}, shipped or the path of a checkpoint, got {agent!r}")
+    asked = str(options.get("agent") or LEARNS)
+    agent = LEARNS if asked == LEARNS else named_agent(asked, spec)
     loaded = load(spec)
     program = compiled(loaded)
     config = _with_partners(new_config(spec, {**options, "agent": agent}, loaded), program)

@@ -120,14 +120,17 @@ def test_what_does_not_fit_is_refused_and_the_rest_is_kept(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["random"], "random does not say which"),
+        (["random"], "random plays any scenario; name one by --on"),
         (["nowhere", "--on", "help"], "nowhere"),
         (["random", "--on", "help", "--record", "3"], "--record: expected --out DIR as well"),
         (["random", "--on", "help", "--seed", str(1 << 63)], "seed: got 9223372036854775808"),
         (["human", "--on", "help", "--json"], "--json: the agent 'human'"),
         (["random", "--on", "help", "--tell", "nothing"], "--tell: the agent 'random' has no use for it"),
         (["oracle", "--on", "help", "--goal", "Go."], "--goal: the agent 'oracle' has no use for it"),
-        (["runs/x", "--on", "help", "--language", "de"], "--language: the agent 'runs/x' has no use for it"),
+        (
+            ["shipped:help", "--on", "help", "--language", "de"],
+            "--language: the agent 'shipped:help' has no use",
+        ),
         (["llm:m", "--on", "help", "--view", "room"], "--view: the agent 'llm:m' has no use for it"),
         (
             ["human", "--on", "help", "--tell", "instructions"],

@@ -90,7 +90,7 @@ def test_a_reader_that_went_away_is_no_error() -> None:
     assert (process.wait(60), errors) == (141, b"")
 
 
-@pytest.mark.parametrize("arguments", [["dance"], ["validate"], ["validate", "--format", "xml", "a.yaml"]])
+@pytest.mark.parametrize("arguments", [["validate"], ["validate", "--format", "xml", "a.yaml"]])
 def test_wrong_usage(arguments: list[str], capsys: Capture) -> None:
     assert main(arguments) == 2
     assert "usage: socialai" in capsys.readouterr().err
@@ -107,6 +107,11 @@ def test_every_command_explains_itself(capsys: Capture) -> None:
     for command in cli._COMMANDS:
         assert main([command, "--help"]) == 0
         assert "--debug" in capsys.readouterr().out
+
+
+def test_an_unknown_command_is_answered_with_the_nearest_one(capsys: Capture) -> None:
+    assert main(["validat", "help"]) == 2
+    assert capsys.readouterr().err == "socialai: there is no command validat; did you mean validate?\n"
 
 
 def test_without_a_command_it_explains_itself(capsys: Capture) -> None:

@@ -78,7 +78,9 @@ class Terminal:
             env=environment,
             encoding="utf-8",
             timeout=60,
-            preexec_fn=partial(signal.signal, signal.SIGHUP, signal.SIG_DFL),  # also where the tests run under nohup
+            preexec_fn=partial(
+                signal.signal, signal.SIGHUP, signal.SIG_DFL
+            ),  # also where the tests run under nohup
         )
         self.written = ""
         self._latest = time.monotonic() + 120

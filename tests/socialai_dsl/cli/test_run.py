@@ -282,7 +282,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(trained: Path, capsys: Capture) 
     ("arguments", "message"),
     [
         ([], "expected a scenario"),
-        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human, shipped or"),
+        (["corridor.yaml", "--agent", "nobody"], "there is no agent 'nobody'; expected the path of a run"),
         (["corridor.yaml", "--agent", "random", "--frames", "10"], "is not trained"),
         (["corridor.yaml", "--net", "huge"], "net: got 'huge'"),
         (
@@ -474,7 +474,7 @@ def test_a_file_says_how_long_an_agent_is_guided() -> None:
     loaded = {name: socialai_dsl.load(f"{name}.yaml") for name in ("corridor", "short", "pair", "acts")}
     usual = {name: usual_options("guided", one) for name, one in loaded.items()}
     assert usual == {
-        "corridor": {"frames": 1_000_000},
+        "corridor": {"frames": 500_000},
         "short": {"frames": 4096},
         "pair": {"frames": 8192, "curriculum": "even"},
         "acts": {"frames": 6_000_000},  # nothing is drawn that a curriculum could choose

@@ -54,7 +54,10 @@ def test_an_agent_that_is_not_trained(tmp_path: Path) -> None:
         ({"frames": "many"}, "frames: expected a valid integer, got 'many'"),
         ({"lr": -1.0}, "lr: expected more than 0, got -1.0"),
         ({"device": "tpu"}, "device: got 'tpu', expected auto, cpu or cuda"),
-        ({"agent": "nobody"}, "agent: expected ppo, random, oracle, human, shipped or"),
+        (
+            {"agent": "nobody"},
+            "there is no agent 'nobody'; expected the path of a run or a checkpoint, random",
+        ),
         ({"agent": "random", "frames": 10}, "frames: the agent 'random' is not trained"),
         ({"recipe": "plain", "guide_share": 0.2}, "guide_share: it is for --guide, and this run has none"),
         ({"recipe": "wild"}, "recipe: got 'wild', expected one of plain"),
