@@ -25,6 +25,11 @@ from socialai_dsl.runs.report import require_libraries
 
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
+EXAMPLES: Final = (
+    ("socialai check gate.yaml", "what it claims"),
+    ("socialai check help --rooms 20 --deep", "what each needs of the other, too"),
+)
+
 _OF_PART: Final = {
     "claims": ("deep", "strict", "rooms", "states", "pictures"),
     "coverage": ("agent", "episodes", "fail_under"),

@@ -15,6 +15,10 @@ from socialai_dsl.runs.folder import CROSSPLAY
 SUMMARY: Final = (
     "let agents, scripts, chance and language models play with each other, everybody with everybody"
 )
+
+EXAMPLES: Final = (
+    ("socialai crossplay oracle random --on together/levers_together --episodes 20", "who gets on with whom"),
+)
 _WIDTH: Final = 100  # characters of a line
 
 

@@ -28,6 +28,12 @@ from socialai_dsl.runs.folder import EVALUATIONS, REPLAY, RESULT
 
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 
+EXAMPLES: Final = (
+    ("socialai evaluate runs/gate --episodes 20", "a run of yours"),
+    ("socialai evaluate oracle --on talkitout --episodes 20", "the script"),
+    ("socialai evaluate llm:MODEL --on talkitout --base-url http://localhost:8080/v1", "a language model"),
+)
+
 _OPTIONS: Final = (
     "greedy",
     "seed",

@@ -12,6 +12,12 @@ from socialai_dsl.experiments.engines import ENGINES
 
 SUMMARY: Final = "plan, run and watch the runs that an experiment file declares"
 
+EXAMPLES: Final = (
+    ("socialai experiment plan paper --profile small", "what it will take"),
+    ("socialai experiment run paper --profile small", "do it"),
+    ("socialai experiment status runs/experiments/paper", "how far it is"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command's commands."""

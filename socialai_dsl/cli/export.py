@@ -8,6 +8,8 @@ from socialai_dsl.cli.errors import Exit
 
 SUMMARY: Final = "make a folder of a trained agent to give to others"
 
+EXAMPLES: Final = (("socialai export runs/gate --out my_agent", "weights, figures and a card"),)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

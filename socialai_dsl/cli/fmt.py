@@ -13,6 +13,11 @@ from socialai_dsl.loader.given import STDIN, given_files
 
 SUMMARY: Final = "format scenario files; comments stay"
 
+EXAMPLES: Final = (
+    ("socialai fmt gate.yaml", "rewrite a file"),
+    ("socialai fmt . --check", "say which are not formatted"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

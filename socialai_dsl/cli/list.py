@@ -10,6 +10,11 @@ from socialai_dsl.loader.shipped import ShippedScenario, catalogue
 
 SUMMARY: Final = "list the scenarios that ship, with their variants and parameters"
 
+EXAMPLES: Final = (
+    ("socialai list", "all that ship"),
+    ("socialai list liar", "those about which a word is said"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

@@ -8,6 +8,8 @@ from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "run the language server for editors, on standard input and output"
 
+EXAMPLES: Final = (("socialai lsp", "as an editor starts it"),)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

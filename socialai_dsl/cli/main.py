@@ -81,6 +81,11 @@ def _overview(modules: Mapping[str, Any]) -> str:
     return "\n".join([*lines, "", "`socialai COMMAND --help` lists the options of a command."]).lstrip("\n")
 
 
+def _examples(examples: Sequence[tuple[str, str]]) -> str:
+    """Commands to try, each with what it is for on the next line."""
+    return "\n".join(["examples:", *(f"  {command}\n      {purpose}" for command, purpose in examples)])
+
+
 def run_main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai-run ...`, the same as `socialai run ...`, and return its exit code."""
     return run_alone("socialai-run", import_module("socialai_dsl.cli.run"), argv)
@@ -91,7 +96,7 @@ def run_alone(program: str, module: Any, argv: Sequence[str] | None = None) -> i
 
     Args:
         program: what it is called.
-        module: has `SUMMARY`, `add_arguments` and `execute`, as every command does.
+        module: has `SUMMARY`, `add_arguments` and `execute`, as every command does, and perhaps `EXAMPLES`.
         argv: what was typed (default: `sys.argv`).
     """
     parser = _Parser(prog=program, description=_sentence(module.SUMMARY))
@@ -113,6 +118,9 @@ def _add_version(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
 
 def _add_command(parser: argparse.ArgumentParser, module: Any) -> None:
     module.add_arguments(parser)
+    if examples := getattr(module, "EXAMPLES", ()):
+        parser.formatter_class = argparse.RawDescriptionHelpFormatter
+        parser.epilog = _examples(examples)
     parser.set_defaults(execute=module.execute)
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 

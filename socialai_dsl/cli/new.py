@@ -11,6 +11,11 @@ from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
 
+EXAMPLES: Final = (
+    ("socialai new gate", "a scenario in which one is asked, with its script and tests"),
+    ("socialai new dance_floor --template imitate", "one in which a dance is repeated"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

@@ -20,6 +20,11 @@ from socialai_dsl.episodes.players import HUMAN_FOLDER
 
 SUMMARY: Final = "play a scenario in the terminal"
 
+EXAMPLES: Final = (
+    ("socialai play talkitout", "by the keys of the terminal"),
+    ("socialai play help --view seat", "seeing what the agent sees"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

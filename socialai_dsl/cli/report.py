@@ -14,6 +14,8 @@ if TYPE_CHECKING:  # it loads pandas, which is only there if reports were asked 
 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 
+EXAMPLES: Final = (("socialai report runs/gate --no-baselines", "one run or several"),)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

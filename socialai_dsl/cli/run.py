@@ -15,6 +15,12 @@ from socialai_dsl.runs.folder import REPLAY, Run
 
 SUMMARY: Final = "train an agent on a scenario, test it, and write pictures and figures"
 
+EXAMPLES: Final = (
+    ("socialai-run talkitout", "master it, shown by its script"),
+    ("socialai-run gate.yaml --frames 8192 --eval-episodes 20 --out runs/gate", "a short run"),
+    ("socialai-run talkitout --agent shipped --eval-episodes 20", "a trained agent"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

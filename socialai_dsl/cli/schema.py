@@ -7,6 +7,8 @@ from socialai_dsl.cli.errors import Exit
 
 SUMMARY: Final = "print the JSON Schema of the scenario language, for editors"
 
+EXAMPLES: Final = (("socialai schema", "the file language.schema.json"),)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command: none."""

@@ -23,6 +23,8 @@ from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "serve a scenario to programs that train language models"
 
+EXAMPLES: Final = (("socialai serve talkitout --protocol openenv", "for OpenEnv's clients"),)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

@@ -10,6 +10,11 @@ from socialai_dsl.diagnostics import printable
 
 SUMMARY: Final = "print a scenario after `extends` and variants, or its compiled program"
 
+EXAMPLES: Final = (
+    ("socialai show dance+as_coded", "a variant as one file"),
+    ("socialai show gate.yaml --program", "what it is compiled to"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

@@ -13,6 +13,11 @@ from socialai_dsl.studio import FIRST_PORT, MOST_WINDOWS
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
 
+EXAMPLES: Final = (
+    ("socialai studio", "everything that ships"),
+    ("socialai studio gate.yaml", "one file"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""

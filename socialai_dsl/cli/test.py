@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "play the tests of scenarios: dialogues that must go as written"
 
+EXAMPLES: Final = (
+    ("socialai test gate.yaml", "its dialogues"),
+    ("socialai test talkitout -k introductions", "those with a word in their name"),
+)
+
 _REPORTS: Final[dict[str, Callable[[Sequence[CheckedInput]], str]]] = {
     **FORMATS,
     "junit": partial(as_junit, command="test"),

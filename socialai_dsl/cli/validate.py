@@ -15,6 +15,11 @@ from socialai_dsl.loader.given import STDIN
 
 SUMMARY: Final = "find mistakes in scenario files without playing"
 
+EXAMPLES: Final = (
+    ("socialai validate gate.yaml", "the mistakes of a file"),
+    ("socialai validate . --strict", "of a folder; warnings fail, too"),
+)
+
 
 def as_text(checked: Sequence[CheckedInput]) -> str:
     """One block per finding with the line it points at, then a summary."""

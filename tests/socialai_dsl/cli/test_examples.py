@@ -1,0 +1,82 @@
+"""The examples of `--help`: every command has some, all are understood, and those that end by themselves work."""
+
+from __future__ import annotations
+
+import shlex
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.cli.main import _COMMANDS, main, run_main
+
+MODULES = {name: import_module(f"socialai_dsl.cli.{name}") for name in _COMMANDS}
+EXAMPLES = [(name, command) for name, module in MODULES.items() for command, _ in module.EXAMPLES]
+
+NOT_HERE = {
+    "play": "needs a terminal",
+    "studio": "serves until it is stopped",
+    "serve": "serves until it is stopped",
+    "lsp": "serves until it is stopped",
+    "socialai-run talkitout": "trains for minutes",
+    "llm:": "needs a model",
+    "experiment run": "trains for hours",
+    "experiment status": "needs the folder of an experiment",
+}
+
+
+def call(command: str) -> int:
+    program, *words = shlex.split(command)
+    return run_main(words) if program == "socialai-run" else main(words)
+
+
+def works_here(name: str, command: str) -> bool:
+    return (
+        name not in NOT_HERE
+        and command not in NOT_HERE
+        and not any(why in command for why in NOT_HERE if " " in why or ":" in why)
+    )
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the first examples were followed: there are a scenario and a run."""
+    folder = tmp_path_factory.mktemp("examples")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert call("socialai new gate") == 0
+        (short,) = (command for command, _ in MODULES["run"].EXAMPLES if "--out runs/gate" in command)
+        assert call(short) == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        c
+        for name, c in EXAMPLES
+        if works_here(name, c) and c != "socialai new gate" and "--out runs/gate" not in c
+    ],
+)
+def test_an_example_works(command: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(place)
+    assert call(command) == 0
+
+
+@pytest.mark.parametrize("command", [c for name, c in EXAMPLES if not works_here(name, c)])
+def test_an_example_that_goes_on_is_understood(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def execute(arguments: Any) -> int:
+        return 0
+
+    for module in MODULES.values():
+        monkeypatch.setattr(module, "execute", execute)
+    assert call(command) == 0
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_every_help_shows_them(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert MODULES[name].EXAMPLES
+    assert all(f"\n  {command}\n      {purpose}\n" in shown for command, purpose in MODULES[name].EXAMPLES)
