@@ -266,7 +266,7 @@ def test_the_networks_are_those_of_the_trainer():
 @pytest.mark.parametrize(
     ("condition", "frames", "curriculum"),
     [
-        ("", 1_000_000, "none"),
+        ("", 500_000, "none"),
         (", frames: 5000", 5000, "none"),
         (", scenario: social_env", None, "even"),
         (", scenario: social_env, curriculum: none", None, "none"),
