@@ -17,6 +17,12 @@ from socialai_dsl.study import FIRST_PORT, FOLDER
 
 SUMMARY: Final = "let people take part in a study in the browser, and make tables of what they did"
 
+EXAMPLES: Final = (
+    ("socialai study rehearse asking.yaml", "simulated participants, in a minute"),
+    ("socialai study run asking.yaml --links 2", "serve it, with links for two people"),
+    ("socialai study data asking.yaml", "the tables of what they did"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command's commands."""

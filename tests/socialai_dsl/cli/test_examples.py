@@ -17,6 +17,7 @@ EXAMPLES = [(name, command) for name, module in MODULES.items() for command, _ i
 NOT_HERE = {
     "play": "needs a terminal",
     "studio": "serves until it is stopped",
+    "study": "needs a study, and serves until it is stopped",
     "serve": "serves until it is stopped",
     "lsp": "serves until it is stopped",
     "socialai-run talkitout": "trains for minutes",
