@@ -1,0 +1,124 @@
+"""The page of a study in a real browser: by the keyboard alone, in each language, on a phone, and loaded again."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from socialai_dsl.frontend import check
+from socialai_dsl.study.words import words_of
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+ROOT = Path(__file__).parents[2]
+STUDY = """\
+study: paged
+language: {language}
+consent: I agree.
+instructions: [Walk.]
+blocks:
+- {{scenario: talkitout_no_liar, episodes: 1}}
+questions:
+- {{id: how, ask: How was it?}}
+- {{id: hard, ask: How hard?, kind: scale, from: 1, to: 3}}
+end: {{code: DONE-1}}
+"""
+
+
+@pytest.fixture
+def link(tmp_path: Path) -> Iterator[Callable[[str], str]]:
+    """Starts a server of a study in a language, and returns the link of a participant."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(language: str) -> str:
+        (tmp_path / "study.yaml").write_text(STUDY.format(language=language), encoding="utf-8")
+        command = [sys.executable, "-m", "socialai_dsl", "study", "run", "study.yaml"]
+        process = subprocess.Popen(
+            [*command, "--port", "0", "--out", str(tmp_path / "out"), "--links", "1"],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        assert process.stdout is not None
+        return [process.stdout.readline().strip() for _ in range(4)][3]
+
+    yield start
+    for process in started:
+        process.terminate()
+        process.wait(20)
+        assert process.stdout is not None
+        process.stdout.close()
+
+
+def test_a_participant_comes_to_the_end_by_the_keyboard_alone(page: Page, link: Callable[[str], str]) -> None:
+    words = words_of("en")
+    page.goto(link("en"))
+    for button in (words["agree"], words["next"]):
+        page.get_by_role("button", name=button).wait_for()
+        for _ in range(10):
+            if page.evaluate("document.activeElement.textContent") == button:
+                break
+            page.keyboard.press("Tab")
+        page.keyboard.press("Enter")
+    page.get_by_text("Round 1 of 1").wait_for()
+    page.keyboard.press("ArrowUp")
+    page.get_by_text("Step 1").wait_for()
+    assert page.get_by_role("img", name=words["sees"]).is_visible()
+    page.reload()
+    page.get_by_text("Step 1").wait_for()
+    page.keyboard.press("/")
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.get_by_text("Step 2").wait_for()
+    page.get_by_role("heading", level=1).focus()
+    page.keyboard.press("x")  # done, which ends this scenario
+    page.get_by_text(words["failure"]).wait_for()
+    page.keyboard.press("Enter")  # the button to go on has the focus
+    page.get_by_text("How was it?").wait_for()
+    page.get_by_role("button", name=words["next"]).click()
+    assert page.get_by_text(words["answer"]).count() == 2
+    page.get_by_role("textbox").fill("well")
+    page.get_by_role("radio", name="2").check()
+    page.get_by_role("button", name=words["next"]).click()
+    page.get_by_text("DONE-1").wait_for()
+
+
+@pytest.mark.parametrize("language", ["de", "fr"])
+def test_the_page_speaks_the_language_of_the_study_and_fits_a_phone(
+    browser: Browser, link: Callable[[str], str], language: str
+) -> None:
+    words = words_of(language)
+    context = browser.new_context(viewport={"width": 360, "height": 740})
+    page = context.new_page()
+    page.goto(link(language))
+    assert page.evaluate("document.documentElement.lang") == language
+    page.get_by_role("button", name=words["agree"]).click()
+    page.get_by_role("button", name=words["next"]).click()
+    page.get_by_role("button", name=words["forward"]).click()
+    page.get_by_text(words["step"].format(number=1)).wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    context.close()
+
+
+def test_every_language_has_every_text() -> None:
+    english = words_of("en")
+    for language in ("de", "fr"):
+        own = words_of(language)
+        assert own.keys() == english.keys()
+        for name, text in own.items():
+            assert text.count("{") == english[name].count("{"), name
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "experiments" / "studies").glob("*.yaml")), ids=lambda f: f.stem
+)
+def test_what_ships_has_no_findings(file: Path) -> None:
+    assert [str(one) for one in check(file).diagnostics] == []
