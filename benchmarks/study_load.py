@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import os
 import random
 import subprocess
 import sys
@@ -52,8 +53,9 @@ async def _taking(
 
 
 async def _all(
-    at: str, links: list[str], every: float, seconds: float, over: float
-) -> tuple[list[float], list[float]]:
+    at: str, links: list[str], every: float, seconds: float, over: float, pid: int
+) -> tuple[list[float], list[float], float]:
+    """Waits of those who are all there, times to the first picture, and processor time of the server for an act."""
     waits: list[float] = []
     first: list[float] = []
     until = time.perf_counter() + over + seconds
@@ -62,8 +64,14 @@ async def _all(
         await asyncio.sleep(over * number / len(links))
         await _taking(at, link, every, until, waits, first)
 
-    await asyncio.gather(*(one(number, link) for number, link in enumerate(links)))
-    return waits, first
+    everybody = asyncio.gather(*(one(number, link) for number, link in enumerate(links)))
+    await asyncio.sleep(over + every)
+    waits.clear()
+    used = _processor(pid)
+    await asyncio.sleep(until - time.perf_counter())
+    used = _processor(pid) - used
+    await everybody
+    return waits, first, used / len(waits)
 
 
 def _memory(pid: int) -> float:
@@ -72,6 +80,12 @@ def _memory(pid: int) -> float:
         if row.startswith("VmHWM"):
             return int(row.split()[1]) / (1 << 20)
     return float("nan")
+
+
+def _processor(pid: int) -> float:
+    """Seconds of processor time that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def main() -> None:
@@ -104,7 +118,7 @@ def main() -> None:
         process.stdout.readline()
         links = [process.stdout.readline().strip() for _ in range(given.participants)]
         time.sleep(5)  # until it is warm
-        waits, first = asyncio.run(_all(at, links, given.every, given.seconds, given.over))
+        waits, first, used = asyncio.run(_all(at, links, given.every, given.seconds, given.over, process.pid))
         memory = _memory(process.pid)
         process.terminate()
         process.wait()
@@ -116,7 +130,7 @@ def main() -> None:
         f"from an act to the picture: {1000 * median(waits):.0f} ms (median), {1000 * waits[share]:.0f} ms (95 %)"
     )
     print(f"from coming to the first picture: {median(first):.2f} s (median), {first[-1]:.2f} s at most")
-    print(f"memory of the server: {memory:.2f} GiB")
+    print(f"the server: {memory:.2f} GiB of memory, {1000 * used:.2f} ms of processor time for an act")
 
 
 if __name__ == "__main__":

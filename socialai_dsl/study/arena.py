@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -29,6 +29,7 @@ Acts = Mapping[Seat, Action | None]
 """Of each seat what was done; None where nobody sat and the member followed its frame."""
 
 _UP: Final = 3
+_REMEMBERED: Final = 4096
 
 
 class Arena:
@@ -58,6 +59,7 @@ class Arena:
         suite = self.program
         programs = suite.programs if isinstance(suite, ProgramSuite) else (suite,)
         self._channels, self._looks = channels_of(programs), words_of_looks(programs)
+        self._sights = lru_cache(_REMEMBERED)(self._sight)
 
     def warm(self, count: int) -> None:
         """See that so many environments wait to be played in, and that a first step takes no longer than others."""
@@ -144,8 +146,13 @@ class Arena:
             image[VIEW // 2, VIEW - 1, LOOKS.index("orientation")] = 0
         text = self._texts[seat]
         # Directions are drawn as they are observed: where they are a compass's, how the player is turned stays unsaid.
-        view = View(image, _UP, not text.by_compass(heard), self._channels, self._looks)
-        return {"view": sight_of(view), "seen": text.observe(observation, heard, last)}
+        sight = self._sights(image.tobytes(), not text.by_compass(heard))
+        return {"view": sight, "seen": text.observe(observation, heard, last)}
+
+    def _sight(self, data: bytes, egocentric: bool) -> dict[str, Any]:
+        """The picture of an image, given as bytes because many are seen again."""
+        image = np.frombuffer(data, np.uint8).reshape(VIEW, VIEW, len(self._channels))
+        return sight_of(View(image, _UP, egocentric, self._channels, self._looks))
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,14 @@ import json
 import os
 import random
 from collections import Counter
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from socialai_dsl.errors import UnreadableError, UsageError
+from socialai_dsl.study import log
 from socialai_dsl.study.data import COLUMNS, study_data, write_data
 from socialai_dsl.study.live import FAST, TAKEN, Live
 from socialai_dsl.study.log import FILE, read_log
@@ -437,3 +439,40 @@ def test_who_is_late_is_not_waited_for(place: Path, tmp_path: Path) -> None:
     run(dawdle)
     (step,) = [event for event in read_log(tmp_path / FILE) if event["event"] == "step"]
     assert sorted(step["by"].values()) == ["person", "script"]
+
+
+def test_a_lid_that_was_closed_for_an_hour_and_a_clock_that_jumps_change_nothing(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Jumping(datetime):
+        hours = 0
+
+        @classmethod
+        def now(cls, tz: Any = None) -> Any:
+            cls.hours -= 1
+            return datetime.now(tz) + timedelta(hours=cls.hours)
+
+    monkeypatch.setattr(log, "datetime", Jumping)
+
+    async def sleep() -> None:
+        clock = Clock()
+        live = Live(loaded_study(ALONE, place), tmp_path, clock)
+        one = await newcomer(live)
+        await until(one, "play")
+        await one.act("left")
+        before = one.now
+        clock.now += 3600
+        await live.tick()
+        again = await Taking(live, one.person).come()
+        assert (again.now["on"], again.now["view"]) == (before["on"], before["view"])
+        await play_on(again, random.Random(1))
+        assert again.now["do"] == "end"
+        await live.close()
+
+    run(sleep)
+    events = list(read_log(tmp_path / FILE))
+    assert [e["time"] for e in events] == sorted((e["time"] for e in events), reverse=True), (
+        "the clock went back"
+    )
+    assert [e["mono"] for e in events] == sorted(e["mono"] for e in events)
+    assert study_data(loaded_study(ALONE, place), tmp_path).replayed == 2
