@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from markdown_it import MarkdownIt
 
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
 from socialai_dsl.episodes.play import Seat
 from socialai_dsl.errors import UsageError
 from socialai_dsl.schema.study import WHO, Question
@@ -118,6 +118,7 @@ class Live:
         self._waiting: dict[int, dict[str, float]] = {}
         self._markdown = MarkdownIt("commonmark", {"html": False, "breaks": False})
         self.progress = Progress(loaded)
+        self._check_agents()
         self._began = clock()
         if self._file.exists() and self._file.stat().st_size:
             self._read()
@@ -352,7 +353,7 @@ class Live:
             arena, played = self.arenas[game.block], game.episode
             assert played is not None, "internal: a game begins with an episode"
             env = arena.take()
-            episode = Episode(arena, self._policies(game, env), reset_of(game.block, played.room), env)
+            episode = Episode(arena, self._policies(game.seats, env), reset_of(game.block, played.room), env)
             for step in played.steps:
                 episode.step(step["acts"])
             found = self._running[game.id] = Running(episode)
@@ -360,9 +361,19 @@ class Live:
                 self._end(game, found)
         return found
 
-    def _policies(self, game: Game, env: Any) -> dict[Seat, Any]:
+    def _check_agents(self) -> None:
+        """See that the trained agents that are named can sit where they are to. Raises UsageError."""
+        for number, block in enumerate(self._study.blocks):
+            env = self.arenas[number].take()
+            try:
+                self._policies(seats_of(block), env)
+            except ValueError as error:
+                raise UsageError(f"block {number + 1}: {error}") from None
+            self.arenas[number].give(env)
+
+    def _policies(self, seats: Mapping[Seat, str], env: Any) -> dict[Seat, Any]:
         """The trained agents on seats."""
-        named = {seat: who for seat, who in game.seats.items() if who not in (*WHO, *self.progress.people)}
+        named = {seat: who for seat, who in seats.items() if who not in (*WHO, *self.progress.people)}
         if not named:
             return {}
         from socialai_dsl.episodes.players import Player, make_policy, require_trainer

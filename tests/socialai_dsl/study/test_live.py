@@ -476,3 +476,13 @@ def test_a_lid_that_was_closed_for_an_hour_and_a_clock_that_jumps_change_nothing
     )
     assert [e["mono"] for e in events] == sorted(e["mono"] for e in events)
     assert study_data(loaded_study(ALONE, place), tmp_path).replayed == 2
+
+
+def test_a_trained_agent_that_does_not_fit_is_refused_before_anybody_comes(
+    place: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("torch", reason="a trained agent needs PyTorch")
+    text = TOGETHER.replace("jill: person", "jill: shipped:talkitout")
+    with pytest.raises(UsageError, match="block 1: "):
+        Live(loaded_study(text, place), tmp_path)
+    assert list(tmp_path.iterdir()) == []
