@@ -78,8 +78,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("data", data, _data),
     ):
         command.add_argument("file", metavar="FILE", help="the file of a study")
+        usual = "default: none is kept" if command is rehearse else f"default: {FOLDER}/NAME"
         command.add_argument(
-            "--out", type=Path, metavar="DIR", help=f"folder of all that is stored (default: {FOLDER}/NAME)"
+            "--out", type=Path, metavar="DIR", help=f"folder of all that is stored ({usual})"
         )
         command.set_defaults(action=name, act=act)
 
