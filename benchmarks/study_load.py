@@ -29,7 +29,7 @@ blocks:
 async def _taking(
     at: str, link: str, every: float, until: float, waits: list[float], first: list[float]
 ) -> None:
-    """Act every so many seconds, and note how long each picture takes."""
+    """Act at about every `every` seconds, and record how long each picture takes to come."""
     came, rng, asked = time.perf_counter(), random.Random(link), 0.0
     uri = f"ws://{at}/seat/{link.rpartition('/')[2]}"
     async with connect(uri, origin=Origin(f"http://{at}"), compression=None, open_timeout=60) as line:

@@ -512,7 +512,7 @@ class Lines:
     def _speak(self, to: Expressions, speaker: Entity, line: int, of: int, as_player: bool = False) -> None:
         """Emit that `speaker` says one of so many lines in its present tone; note it if a condition reads it.
 
-        What a script says while somebody has the seat is not noted: the player speaks then (`as_player`).
+        While a player has the seat, only what the player says is noted (`as_player`), not what the script would say.
         """
         block = to.block
         if speaker.tone is not None:

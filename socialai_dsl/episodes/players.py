@@ -31,6 +31,8 @@ from socialai_dsl.runs.folder import CONFIG, agent_of
 from trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
 from trainer.shipped import PREFIX, located, shipped_agents
 
+SHIPPED: Final = "shipped"
+"""The agent that ships for the scenario that is played."""
 HUMAN_FOLDER: Final = Path("runs", "human")
 """Where the sessions of people go unless the user says otherwise."""
 
@@ -276,7 +278,7 @@ def named_agent(agent: str, scenario: str) -> str:
         ScenarioError: the scenario has mistakes.
         UsageError: none ships for it; or see `played_again`.
     """
-    if agent != "shipped":
+    if agent != SHIPPED:
         return played_again(agent)
     path, shipped = load(scenario).resolved.path, shipped_folder().resolve()
     _, *variants = scenario.partition("?")[0].split("+")
@@ -290,9 +292,9 @@ def named_agent(agent: str, scenario: str) -> str:
     raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
 
 
-def is_no_folder(agent: str) -> bool:
+def is_name(agent: str) -> bool:
     """Whether an agent is no path: a script, chance, a person, a language model, the one that ships for a scenario."""
-    return agent in (*UNTRAINED, "shipped") or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX))
+    return agent in (*UNTRAINED, SHIPPED) or agent.startswith((MODEL_PREFIX, RIVAL_PREFIX))
 
 
 def played_again(agent: str) -> str:
@@ -302,7 +304,7 @@ def played_again(agent: str) -> str:
         UsageError: there is no such agent; or a person or a language model played there, or an agent that is not here.
         OSError: what the folder says cannot be read.
     """
-    if is_no_folder(agent):
+    if is_name(agent):
         return agent
     folder = existing_folder(agent)
     if not (folder / CONFIG).is_file() or (played := agent_of(folder)) == LEARNS:

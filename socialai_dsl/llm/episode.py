@@ -47,8 +47,6 @@ _STOPS: Final = {
 }
 """What a model is told of replies that ended before an action, which are no mistakes in what it writes."""
 
-TEST_SET: Final = 500
-"""The episodes of the test set."""
 _TRIES: Final = 3
 
 

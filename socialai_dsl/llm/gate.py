@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.draws import MAX_SEED
 from socialai_dsl.llm.completion import storable
-from socialai_dsl.llm.episode import TEST_SET
+from socialai_dsl.schema.scenario import TEST_SET
 
 IDLE: Final = 900.0
 """Seconds that a session may be silent, unless the server is told otherwise."""

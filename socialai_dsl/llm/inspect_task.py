@@ -29,11 +29,12 @@ from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.envs.asking import probe_names
 from socialai_dsl.episodes.partners import Beside, beside
 from socialai_dsl.llm.actions import Mode
-from socialai_dsl.llm.episode import CUT_SHORT, TEST_SET, Episode, OnInvalid
+from socialai_dsl.llm.episode import CUT_SHORT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.inspect_session import EPISODES, PROBES, Session
 from socialai_dsl.llm.prompting import Probing, PromptOptions
 from socialai_dsl.llm.view import Style, TextView
+from socialai_dsl.schema.scenario import TEST_SET
 from socialai_dsl.traces.endings import endings_of
 
 TEN: Final = (

@@ -11,9 +11,10 @@ from socialai_dsl.checking.briefing import Briefing, Tell, brief
 from socialai_dsl.envs.factory import Scenario
 from socialai_dsl.episodes.partners import Beside, beside
 from socialai_dsl.llm.actions import ActionLanguage, ToolCall
-from socialai_dsl.llm.episode import TEST_SET, Episode
+from socialai_dsl.llm.episode import Episode
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
+from socialai_dsl.schema.scenario import TEST_SET
 
 _CLOSING: Final = "Reply without calling a tool."
 

@@ -20,7 +20,7 @@ from socialai_dsl.episodes.players import (
     Player,
     existing_folder,
     folder_of,
-    is_no_folder,
+    is_name,
     named_agent,
     played_again,
     player_of,
@@ -321,7 +321,7 @@ def own_scenario(agent: str) -> str:
     Raises:
         UsageError: it is neither.
     """
-    if is_no_folder(agent):
+    if is_name(agent):
         raise UsageError(f"{agent} plays any scenario; name one by --on, such as --on talkitout")
     run = existing_folder(agent)
     if not (run / CONFIG).is_file():

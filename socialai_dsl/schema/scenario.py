@@ -45,6 +45,8 @@ TypeName = Annotated[Word, Holds("name", ("types",))]
 ObjectName = Annotated[str, Holds("name", ("objects",))]
 """Names that are declared elsewhere; that of an object may have a number, `boxes[1]`."""
 
+TEST_SET: Final = 500
+"""The rooms in which everybody is tested unless told otherwise."""
 LANGUAGE_TAG: Final = r"^[a-z]{2,3}(-[A-Z][a-z]{3})?(-([A-Z]{2}|[0-9]{3}))?$"
 """Language, perhaps script, perhaps country or region."""
 

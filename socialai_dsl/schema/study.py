@@ -7,7 +7,16 @@ from typing import Annotated, Final, Literal
 from pydantic import Discriminator, Field, StringConstraints, Tag
 
 from socialai_dsl.schema.holds import Holds
-from socialai_dsl.schema.scenario import NOT_BLANK, ListOf, Model, Probability, Prose, Word, as_written
+from socialai_dsl.schema.scenario import (
+    NOT_BLANK,
+    TEST_SET,
+    ListOf,
+    Model,
+    Probability,
+    Prose,
+    Word,
+    as_written,
+)
 from socialai_dsl.schema.suite import MemberName
 
 PERSON: Final = "person"
@@ -15,9 +24,6 @@ PERSON: Final = "person"
 
 WHO: Final = (PERSON, "script", "random", "nobody")
 """Who can have a seat without being a trained agent."""
-
-TEST_ROOMS: Final = 500
-"""How many rooms the test set of a scenario has."""
 
 _Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=20_000)]
 Told = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
@@ -76,8 +82,8 @@ Questions = Annotated[ListOf[Question], Field(max_length=200)]
 Rooms = Annotated[
     Annotated[Literal["test"], Tag("word")]
     | Annotated[
-        ListOf[Annotated[int, Field(ge=0, lt=TEST_ROOMS)]],
-        Field(min_length=1, max_length=TEST_ROOMS),
+        ListOf[Annotated[int, Field(ge=0, lt=TEST_SET)]],
+        Field(min_length=1, max_length=TEST_SET),
         Tag("list"),
     ],
     Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "word"),
@@ -91,7 +97,7 @@ class Block(Model):
         None, description="its name in the data; default the scenario's name and its number"
     )
     scenario: MemberName = Field(description="the scenario, with variants and parameters")
-    episodes: int = Field(ge=1, le=TEST_ROOMS, description="how many are played")
+    episodes: int = Field(ge=1, le=TEST_SET, description="how many are played")
     rooms: Rooms = Field(
         "test",
         description="`test`: the rooms of the test set, in which agents are evaluated, beginning with number 0, or "
@@ -184,7 +190,7 @@ class End(Model):
     """The last page."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=80), Holds("label")] | None = Field(
-        None, description="the code that says that somebody came to the end"
+        None, description="the completion code"
     )
     say: Told | None = Field(None, description="what is said there besides thanks")
     link: (

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.schema.study import TEST_ROOMS, Block, Study
+from socialai_dsl.schema.scenario import TEST_SET
+from socialai_dsl.schema.study import Block, Study
 from socialai_dsl.source import Node
 
 
@@ -64,10 +65,10 @@ def _rooms(blocks: Sequence[Block], places: Node, bag: DiagnosticBag) -> tuple[t
         if isinstance(block.rooms, str):  # the test set
             first = begun.get(block.scenario, 0)
             begun[block.scenario] = first + block.episodes
-            if first + block.episodes > TEST_ROOMS:
+            if first + block.episodes > TEST_SET:
                 before = f" beside the {first} of blocks above" if first else ""
                 message = (
-                    f"{block.episodes} episodes{before} are more than the {TEST_ROOMS} rooms of the test set"
+                    f"{block.episodes} episodes{before} are more than the {TEST_SET} rooms of the test set"
                 )
                 bag.error("S901", message, places.value_span(("blocks", number, "episodes")))
             found.append(tuple(range(first, first + block.episodes)))
@@ -118,9 +119,8 @@ def _balanced(own: Sequence[tuple[int, ...]], places: Node, bag: DiagnosticBag) 
         needed = len(balanced_orders(len(plays))) if plays else 1
         if groups % needed:
             span = places.value_span(("assign", "groups")) if len(met) == 1 else places.key_span(("assign",))
-            what = f"{len(plays)} blocks have {needed} balanced orders, and {groups} group"
-            plays_them = "plays them" if groups == 1 else "s play them"
-            message = f"{what} {plays_them}" if groups == 1 else f"{what}{plays_them}"
+            who = "1 group plays them" if groups == 1 else f"{groups} groups play them"
+            message = f"{len(plays)} blocks have {needed} balanced orders, and {who}"
             hint = f"as many groups as {needed}, or a multiple of it; or `order: fixed`"
             bag.error("S902", message, span, hint=hint)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, Final
 from socialai_dsl.atomic import write_json, write_text
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy
 from socialai_dsl.errors import UnreadableError, UsageError
+from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
 from socialai_dsl.study.live import header_of, reset_of
 from socialai_dsl.study.log import FILE, Event, read_log
@@ -94,8 +96,16 @@ class _Of:
 
     times: list[float] = field(default_factory=list)
     episodes: int = 0
-    won: int = 0
     left: int = 0
+
+
+@dataclass(frozen=True)
+class _Going:
+    """An episode that is played again: when it began, and how many steps a person chose on each seat."""
+
+    episode: Episode
+    began: str
+    chosen: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -137,7 +147,7 @@ class _Tables:
         }
         self._progress = Progress(loaded)
         self._rows: dict[str, list[Row]] = {name: [] for name in COLUMNS}
-        self._going: dict[str, tuple[Episode, str]] = {}
+        self._going: dict[str, _Going] = {}
         self._of: dict[str, _Of] = {}
         self._server, self._replayed = 0, 0
 
@@ -183,20 +193,20 @@ class _Tables:
                         f"got the room {event['room']}, expected {progress.rooms(game)[event['number']]}"
                     )
                 env = arena.take()
-                self._going[game.id] = (
-                    Episode(arena, {}, reset_of(game.block, event["room"]), env),
-                    event["time"],
-                )
+                episode = Episode(arena, {}, reset_of(game.block, event["room"]), env)
+                self._going[game.id] = _Going(episode, event["time"])
             case "step":
                 self._step(progress.games[event["game"]], event)
             case "ended":
                 self._ended(progress.games[event["game"]], event)
 
     def _step(self, game: Game, event: Event) -> None:
-        episode, _ = self._going[game.id]
+        going = self._going[game.id]
+        episode = going.episode
         if event["t"] != episode.t or event["episode"] != len(game.results):
             raise ValueError(f"got step {event['t']} of episode {event['episode']}, expected {episode.t}")
         episode.step(event["acts"])
+        going.chosen.update(seat for seat, by in event["by"].items() if by == PERSON)
         for seat in episode.arena.seats:
             who, time = game.seats.get(seat, "script"), event["times"].get(seat, {})
             person = who if who in self._progress.people else ""
@@ -228,7 +238,8 @@ class _Tables:
             )
 
     def _ended(self, game: Game, event: Event) -> None:
-        episode, began = self._going.pop(game.id)
+        going = self._going.pop(game.id)
+        episode = going.episode
         came = episode.ending
         if came is None or (came.outcome, came.success, came.returns) != (
             event["outcome"],
@@ -237,22 +248,12 @@ class _Tables:
         ):
             raise ValueError(f"the episode came out as {came}, and the log says {event['outcome']!r}")
         self._replayed += 1
-        rows = [
-            row
-            for row in self._rows["steps"][-episode.t * len(episode.arena.seats) :]
-            if row["game"] == game.id
-        ]
         for seat, who in game.seats.items():
             if who not in self._progress.people:
                 continue
             of, gone = self._of[who], who in game.gone
             if game.block != PRACTICE:
                 of.episodes += 1
-                of.won += bool(event["success"][seat]) and not gone
-            own = sum(
-                row["seat"] == seat and row["by"] == "person" and row["trial"] == event["episode"] + 1
-                for row in rows
-            )
             person = self._progress.people[who]
             order = self._loaded.design.orders[(person.group or 1) - 1]
             others = [f"{other}={one}" for other, one in game.seats.items() if other != seat]
@@ -269,12 +270,12 @@ class _Tables:
                     "seat": seat,
                     "others": " ".join(others),
                     "steps": episode.t,
-                    "own_steps": own,
+                    "own_steps": going.chosen[seat],
                     "success": event["success"][seat],
                     "outcome": event["outcome"],
                     "return": event["returns"][seat],
                     "left": gone,
-                    "began": began,
+                    "began": going.began,
                     "ended": event["time"],
                 }
             )
@@ -317,7 +318,7 @@ class _Tables:
             "practice_rounds": person.rounds,
             "practised": "" if person.practised is None else person.practised,
             "episodes": of.episodes,
-            "successes": of.won,
+            "successes": person.won,
             "median_ms": round(median(of.times), 1) if of.times else "",
             "pages_opened": person.connections,
             "left": of.left,
@@ -331,7 +332,7 @@ class _Tables:
             yield "declined" if person.declined else "unfinished"
         if rules.practice and person.practised is False:
             yield "practice"
-        if rules.success_below is not None and of.won < rules.success_below * of.episodes:
+        if rules.success_below is not None and person.won < rules.success_below * of.episodes:
             yield f"success below {rules.success_below:g}"
         if rules.faster_than is not None and of.times and median(of.times) < rules.faster_than:
             yield f"faster than {rules.faster_than} ms"

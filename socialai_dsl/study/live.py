@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
 from socialai_dsl.episodes.play import Seat
 from socialai_dsl.errors import UsageError
-from socialai_dsl.schema.study import WHO, Question
+from socialai_dsl.schema.study import PERSON, WHO, Question
 from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, FORMAT, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
@@ -120,10 +120,9 @@ class Live:
         self.progress = Progress(loaded)
         self._check_agents()
         self._began = clock()
-        if self._file.exists() and self._file.stat().st_size:
-            self._read()
+        known = self._read() if self._file.exists() and self._file.stat().st_size else 0
         self._log = Log(self._file)
-        if not self._events:
+        if not known:
             self._do("study", **self._header())
         self._do("server")
         self._mend()
@@ -133,16 +132,15 @@ class Live:
             return None if self._study.practice is None else self._study.practice.tell
         return self._study.blocks[number].tell
 
-    _events = 0
-
-    def _read(self) -> None:
-        """Be where the log says."""
-        self.progress, self._events = Progress(self._loaded), 0
+    def _read(self) -> int:
+        """Be where the log says; how many events it has."""
+        self.progress, count = Progress(self._loaded), 0
         for event in read_log(self._file):
             if event["event"] == "study":
                 self._check(event)
             self.progress.apply(event)
-            self._events += 1
+            count += 1
+        return count
 
     def _mend(self) -> None:
         """Begin what was to begin when the server died."""
@@ -176,7 +174,6 @@ class Live:
         """Let something happen: it is applied at once, and shown once it is stored."""
         event = self._log.add(kind, **more)
         self.progress.apply(event)
-        self._events += 1
         return event
 
     async def _show(self, people: Iterable[str]) -> None:
@@ -419,7 +416,7 @@ class Live:
         for seat in episode.arena.seats:
             choice, who = running.chosen.get(seat), game.seats.get(seat, "script")
             if choice is not None:
-                acts[seat], by[seat] = choice.action, "person"
+                acts[seat], by[seat] = choice.action, PERSON
                 times[seat] = {
                     "connection": choice.connection,
                     "shown": choice.shown,
@@ -600,7 +597,7 @@ class Live:
             "do": "play",
             "practice": practice,
             "episode": played.number + 1,
-            "episodes": len(self.progress.rooms(game)),
+            "episodes": self.progress.episodes(game),
             "t": episode.t,
             "told": episode.told(seat),
             "heard": episode.heard[seat][-MOST_LINES:],

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
+from socialai_dsl.schema.study import PERSON
 from socialai_dsl.semantics.study import least_filled, shuffled
 from socialai_dsl.study.log import Event
 
@@ -132,6 +133,13 @@ class Progress:
             else rooms
         )
 
+    def episodes(self, game: Game) -> int:
+        """How many episodes a game has."""
+        if game.block != PRACTICE:
+            return len(self.loaded.design.rooms[game.block])
+        assert self.study.practice is not None, "internal: there is practice"
+        return self.study.practice.episodes
+
     def full(self) -> bool:
         """Whether as many have agreed to take part as may."""
         most = self.study.participants
@@ -154,11 +162,11 @@ class Progress:
         turned = [*persons[before % len(persons) :], *persons[: before % len(persons)]]
         stands_in = self.study.blocks[block].stands_in
         taken = dict(zip(turned, people, strict=False))
-        return {seat: taken.get(seat, stands_in if who == "person" else who) for seat, who in seats.items()}
+        return {seat: taken.get(seat, stands_in if who == PERSON else who) for seat, who in seats.items()}
 
     def is_over(self, game: Game) -> bool:
         """Whether all episodes of a game have ended."""
-        return len(game.results) >= len(self.rooms(game))
+        return len(game.results) >= self.episodes(game)
 
     def seat_of(self, game: Game, person: str) -> str:
         """The seat that a participant has in a game."""

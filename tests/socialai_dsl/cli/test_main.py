@@ -103,12 +103,6 @@ def test_help_and_version(entry: Callable[[list[str]], int], capsys: Capture) ->
         assert expected in capsys.readouterr().out
 
 
-def test_every_command_explains_itself(capsys: Capture) -> None:
-    for command in cli._COMMANDS:
-        assert main([command, "--help"]) == 0
-        assert "--debug" in capsys.readouterr().out
-
-
 def test_an_unknown_command_is_answered_with_the_nearest_one(capsys: Capture) -> None:
     assert main(["validat", "help"]) == 2
     assert capsys.readouterr().err == "socialai: there is no command validat; did you mean validate?\n"

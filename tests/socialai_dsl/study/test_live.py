@@ -14,7 +14,7 @@ import pytest
 
 from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.study import log
-from socialai_dsl.study.data import COLUMNS, study_data, write_data
+from socialai_dsl.study.data import COLUMNS, StudyData, study_data, write_data
 from socialai_dsl.study.live import FAST, TAKEN, Live
 from socialai_dsl.study.log import FILE, read_log
 from socialai_dsl.study.status import status_of
@@ -371,6 +371,39 @@ def test_nobody_plays_with_who_has_left_the_waiting_room(place: Path, tmp_path: 
     run(leave)
 
 
+def agree(data: StudyData) -> None:
+    """The tables say the same of each other, whoever else played meanwhile."""
+    chosen = Counter(
+        (row["participant"], row["game"], row["trial"])
+        for row in data.tables["steps"]
+        if row["by"] == "person"
+    )
+    lasted = Counter((row["game"], row["trial"], row["seat"]) for row in data.tables["steps"])
+    won = Counter[str]()
+    for row in data.tables["episodes"]:
+        assert row["own_steps"] == chosen[row["participant"], row["game"], row["trial"]]
+        assert row["steps"] == lasted[row["game"], row["trial"], row["seat"]]
+        won[row["participant"]] += row["block"] != "practice" and row["success"] and not row["left"]
+    for person in data.tables["participants"]:
+        assert person["successes"] == won[person["participant"]]
+
+
+def test_tables_agree_where_several_play_at_once(place: Path, tmp_path: Path) -> None:
+    async def play() -> None:
+        live, rng = Live(loaded_study(ALONE, place), tmp_path), random.Random(5)
+        people = [await newcomer(live) for _ in range(3)]
+        for _ in range(10_000):
+            if all(one.now["do"] == "end" for one in people):
+                break
+            await play_on(rng.choice(people), rng, 1)
+        await live.close()
+
+    run(play)
+    data = study_data(loaded_study(ALONE, place), tmp_path)
+    assert data.replayed == 6
+    agree(data)
+
+
 def test_the_script_takes_over_when_somebody_leaves_and_hands_back(place: Path, tmp_path: Path) -> None:
     async def leave() -> None:
         clock = Clock()
@@ -416,6 +449,7 @@ def test_the_script_takes_over_when_somebody_leaves_and_hands_back(place: Path, 
     assert [event["event"] for event in events if event["event"] in ("gone", "back")] == ["gone", "back"]
     data = study_data(loaded_study(TOGETHER, place), tmp_path)
     assert data.replayed == 2
+    agree(data)
     assert [row["left"] for row in data.tables["participants"]] == [0, 1]
 
 
