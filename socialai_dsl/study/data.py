@@ -261,7 +261,7 @@ class _Tables:
                 {
                     "participant": who,
                     "game": game.id,
-                    "block": self._block(game.block),
+                    "block": block_name(self._loaded, game.block),
                     "scenario": self._loaded.played[game.block].name,
                     "program": self._arenas[game.block].program.sha256,
                     "position": 0 if game.block == PRACTICE else order.index(game.block) + 1,
@@ -281,12 +281,6 @@ class _Tables:
             )
         self._arenas[game.block].give(episode.env)
 
-    def _block(self, number: int) -> str:
-        if number == PRACTICE:
-            return "practice"
-        block = self._loaded.study.blocks[number]
-        return block.name or f"{self._loaded.played[number].name}_{number + 1}"
-
     def _answers(self, event: Event) -> None:
         _, block = self._progress.stage(self._progress.people[event["participant"]])
         study = self._loaded.study
@@ -296,7 +290,7 @@ class _Tables:
         self._rows["answers"] += [
             {
                 "participant": event["participant"],
-                "block": "" if block == PRACTICE else self._block(block),
+                "block": "" if block == PRACTICE else block_name(self._loaded, block),
                 "question": name,
                 "kind": kinds[name],
                 "answer": answer,
@@ -336,6 +330,13 @@ class _Tables:
             yield f"success below {rules.success_below:g}"
         if rules.faster_than is not None and of.times and median(of.times) < rules.faster_than:
             yield f"faster than {rules.faster_than} ms"
+
+
+def block_name(loaded: LoadedStudy, number: int) -> str:
+    """What a block, or practice, is called in the tables."""
+    if number == PRACTICE:
+        return "practice"
+    return loaded.study.blocks[number].name or f"{loaded.played[number].name}_{number + 1}"
 
 
 def write_data(data: StudyData, loaded: LoadedStudy, out: Path, parquet: bool = False) -> list[Path]:

@@ -8,7 +8,7 @@ import random
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,11 +21,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from socialai_dsl.checking.loaded import unscripted
-from socialai_dsl.checking.studies import LoadedStudy
+from socialai_dsl.checking.studies import LoadedStudy, persons_of
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import closest_script
+from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
-from socialai_dsl.study.data import StudyData, study_data
+from socialai_dsl.study.data import StudyData, block_name, study_data
 from socialai_dsl.study.live import reset_of
 from socialai_dsl.study.messages import Screen
 from socialai_dsl.study.server import StudyServer
@@ -92,11 +93,13 @@ class Rehearsal:
         people = self.data.tables["participants"]
         groups = Counter(row["group"] for row in people if row["group"] != "")
         yield "groups: " + ", ".join(f"{group}: {count}" for group, count in sorted(groups.items()))
+        persons = {block_name(loaded, n): persons_of(block) for n, block in enumerate(loaded.study.blocks)}
         for block in dict.fromkeys(row["block"] for row in self.data.tables["episodes"]):
             rows = [row for row in self.data.tables["episodes"] if row["block"] == block]
             won = sum(row["success"] for row in rows)
-            stood = sum("script" in row["others"] or bool(row["left"]) for row in rows)
-            more = f", {stood} beside a stand-in" if stood else ""
+            played = {(row["game"], row["trial"]) for row in rows}
+            stood = len(played & self._with_stand_ins(persons.get(block, ())))
+            more = f", {stood} with a stand-in" if stood else ""
             yield f"  {block}: {len(rows)} episodes, {won / len(rows):.0%} successful{more}"
         excluded = Counter(row["excluded"] for row in people if row["excluded"])
         if excluded:
@@ -111,6 +114,11 @@ class Rehearsal:
             at = waits[min(len(waits) - 1, int(0.95 * len(waits)))]
             yield f"from an act to the next picture: {1000 * median(waits):.0f} ms (median), {1000 * at:.0f} ms (95 %)"
         yield f"{self.data.replayed} episodes were played again, and each came out as it did"
+
+    def _with_stand_ins(self, persons: Sequence[str]) -> set[tuple[str, int]]:
+        """Games and trials in which somebody else than a person chose a step on a seat that is a person's."""
+        steps = self.data.tables["steps"]
+        return {(r["game"], r["trial"]) for r in steps if r["seat"] in persons and r["by"] != PERSON}
 
 
 def rehearse(

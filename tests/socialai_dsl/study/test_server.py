@@ -181,6 +181,15 @@ def test_a_rehearsal_goes_through_the_server_and_says_what_came_of_it(
     assert "each came out as it did" in lines
 
 
+@pytest.mark.parametrize(("jill", "stands_in"), [("script", False), ("person", True)])
+def test_a_script_that_the_file_seats_is_no_stand_in(
+    jill: str, stands_in: bool, place: Path, tmp_path: Path
+) -> None:
+    loaded = loaded_study(TOGETHER.replace("jill: person", f"jill: {jill}"), place)
+    found = rehearse(loaded, tmp_path, 1, pace=0.5, speed=100, kinds=("random",))
+    assert ("2 with a stand-in" in "\n".join(found.lines(loaded))) == stands_in, "nobody else comes"
+
+
 def test_commands_say_what_they_found(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
