@@ -28,6 +28,8 @@ MOST_LINES: Final = 200
 _BURST: Final = 60
 _PER_SECOND: Final = 20
 """Messages that a page may send: at once, and in each second."""
+_DROPPED: Final = 3600
+"""Seconds without a sign of somebody who has not come to the end, after which another one may take part instead."""
 
 
 @dataclass(eq=False)
@@ -120,6 +122,7 @@ class Live:
         self.progress = Progress(loaded)
         self._check_agents()
         self._began = clock()
+        self._left: dict[str, float] = {}  # when a page was closed that this server had
         known = self._read() if self._file.exists() and self._file.stat().st_size else 0
         self._log = Log(self._file)
         if not known:
@@ -243,7 +246,25 @@ class Live:
         """Let a page go, which was closed."""
         if self.pages.get(page.person) is page:
             del self.pages[page.person]
+            self._left[page.person] = self._clock()
             self._do("left", participant=page.person, connection=page.connection)
+
+    def full(self) -> bool:
+        """Whether nobody else can take part, unless somebody drops out."""
+        return self.progress.full(self._dropped())
+
+    def _dropped(self) -> set[str]:
+        """Those who have not come to the end, and whose page has not been heard for an hour."""
+        return {
+            person.id
+            for person in self.progress.people.values()
+            if person.ended is None and not self._heard_lately(person.id)
+        }
+
+    def _heard_lately(self, person: str) -> bool:
+        page = self.pages.get(person)
+        heard = page.sign if page is not None else self._left.get(person, self._began)
+        return self._clock() - heard < _DROPPED
 
     def is_there(self, person: str, away: float) -> bool:
         """Whether a participant has an open page that was heard in the last so many seconds."""
@@ -274,8 +295,8 @@ class Live:
         """Do what a message asks for if the screen has it; who else sees something new."""
         stage, _ = self.progress.stage(person)
         match message, stage:
-            case Go(), "consent" if not self.progress.full():
-                self._do("agreed", participant=person.id, group=self.progress.next_group())
+            case Go(), "consent" if not self.full():
+                self._do("agreed", participant=person.id, group=self.progress.next_group(self._dropped()))
                 self._enter(person)
             case Decline(), "consent":
                 self._do("declined", participant=person.id)
@@ -545,7 +566,7 @@ class Live:
                     "do": "consent",
                     **on,
                     "html": self._html(self._loaded.consent),
-                    "full": self.progress.full(),
+                    "full": self.full(),
                 }
             case "page":
                 pages = self._loaded.instructions

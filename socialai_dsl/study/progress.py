@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -140,18 +140,22 @@ class Progress:
         assert self.study.practice is not None, "internal: there is practice"
         return self.study.practice.episodes
 
-    def full(self) -> bool:
-        """Whether as many have agreed to take part as may."""
+    def full(self, dropped: Container[str]) -> bool:
+        """Whether as many take part as may, without those who dropped out."""
         most = self.study.participants
-        return most is not None and sum(p.group is not None for p in self.people.values()) >= most
+        return most is not None and sum(self._sizes(dropped)) >= most
 
-    def next_group(self) -> int:
-        """The group of whoever agrees next, from 1."""
-        counts = [0] * len(self.loaded.design.orders)
+    def next_group(self, dropped: Container[str]) -> int:
+        """The group of whoever agrees next, from 1, where those who dropped out do not count."""
+        return least_filled(self._sizes(dropped)) + 1
+
+    def _sizes(self, dropped: Container[str]) -> list[int]:
+        """How many have agreed and not dropped out, of each group."""
+        sizes = [0] * len(self.loaded.design.orders)
         for person in self.people.values():
-            if person.group is not None:
-                counts[person.group - 1] += 1
-        return least_filled(counts) + 1
+            if person.group is not None and person.id not in dropped:
+                sizes[person.group - 1] += 1
+        return sizes
 
     def seating(self, block: int, people: list[str]) -> dict[str, str]:
         """Who sits where in a new game: people on the seats for them, each pair the other way round than the last."""

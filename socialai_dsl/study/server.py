@@ -70,6 +70,7 @@ class StudyServer:
         self._key = _key(folder / KEY)
         self._recruited = _recruited(folder / RECRUITED)
         self._codes = {self.code(person): person for person in self.live.progress.people}
+        self._joining = asyncio.Lock()  # so that nobody who comes twice at once gets two links
         self._may_join = float(_MOST_JOINING)
         self.app = Starlette(
             routes=[
@@ -123,9 +124,15 @@ class StudyServer:
         return self._said("unknown", 404) if self._is_ours(request) else _refused()
 
     async def _join(self, request: Request) -> Response:
-        """Give whoever comes from a platform a link of their own."""
+        """Give whoever comes a link of their own, and whoever comes again from a platform the one they have."""
         if not self._is_ours(request):
             return _refused()
+        if request.method == "HEAD":  # asks whether there is something, and does not come
+            return guarded(Response())
+        async with self._joining:
+            return await self._joined(request)
+
+    async def _joined(self, request: Request) -> Response:
         recruit = self._loaded.study.recruit
         given = request.query_params.get(recruit.id, "")[:200]
         known = self._recruited.get(given) if given else None
@@ -133,7 +140,7 @@ class StudyServer:
             if recruit.on_return == "refuse":
                 return self._said("again", 403)
             return _to(f"/p/{self.code(known)}")
-        if self.live.progress.full():
+        if self.live.full():
             return self._said("full", 403)
         if self._may_join < 1:
             return self._said("fast", 429)

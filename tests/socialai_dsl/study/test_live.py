@@ -355,6 +355,32 @@ def test_the_script_takes_the_seat_for_which_nobody_comes(place: Path, tmp_path:
     assert game["seats"] == {"agent": "p0001", "jill": "script"}
 
 
+def test_another_takes_the_place_of_who_dropped_out(place: Path, tmp_path: Path) -> None:
+    text = ALONE + "participants: 2\nassign: {groups: 2}\n"
+
+    async def take_part() -> None:
+        clock = Clock()
+        live = Live(loaded_study(text, place), tmp_path, clock)
+        stays, drops, late = [await newcomer(live) for _ in range(3)]
+        await stays.go()
+        await drops.go()
+        assert (await late.go())["do"] == "consent", "two take part, and two may"
+        assert drops.page is not None
+        live.go(drops.page)
+        for _ in range(60):
+            assert (await late.go())["do"] == "consent"
+            clock.now += 60
+            await stays.beat()
+            await late.beat()
+        assert (await late.go())["do"] == "page"
+        assert [live.progress.people[one.person].group for one in (stays, drops, late)] == [1, 2, 2]
+        assert (await Taking(live, drops.person).come()).now["do"] == "page", "who comes back goes on"
+        assert (await (await newcomer(live)).go())["do"] == "consent"
+        await live.close()
+
+    run(take_part)
+
+
 def test_nobody_plays_with_who_has_left_the_waiting_room(place: Path, tmp_path: Path) -> None:
     async def leave() -> None:
         clock = Clock()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -109,6 +110,22 @@ def test_who_comes_from_a_platform_gets_a_link_of_their_own_and_the_same_again(f
         assert httpx.get(f"{at}/join?PROLIFIC_PID=abc").headers["location"] == first, "after a new start, too"
     assert (out / "recruited.csv").read_text(encoding="utf-8").split() == ["p0001,abc", "p0002,other"]
     assert "abc" not in (out / "log.jsonl").read_text(), "ids are kept apart from the data"
+
+
+def test_who_comes_twice_at_once_gets_one_link_and_a_look_ahead_gets_none(
+    place: Path, tmp_path: Path
+) -> None:
+    async def come() -> set[str]:
+        server = StudyServer(loaded_study(ALONE, place), tmp_path, "127.0.0.1")
+        transport = httpx.ASGITransport(server.app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
+            assert (await client.head("/join?PROLIFIC_PID=abc")).status_code == 200
+            found = await asyncio.gather(*(client.get("/join?PROLIFIC_PID=abc") for _ in range(5)))
+        assert len(server.live.progress.people) == 1
+        await server.live.close()
+        return {response.headers["location"] for response in found}
+
+    assert len(run(come)) == 1
 
 
 def test_behind_a_proxy_only_its_address_is_answered(place: Path, tmp_path: Path) -> None:
