@@ -97,16 +97,19 @@ def added(tree: Node, path: DataPath, text: str) -> TextEdit | None:
     part = tree.get(path)
     if part is None or part.children is None or part.substituted:
         return None
-    last = [child for _, child in part.items()][-1:]
-    place = last[0].end if last else part.span.start + 1
+    last = part.last
+    place = last.end if last is not None else part.span.start + 1
     if part.is_braced:
-        return part.source.edit(place, place, f", {text}" if last else text)
-    if not last or last[0].source != part.source:
+        return part.source.edit(place, place, f", {text}" if last is not None else text)
+    if last is None or last.source != part.source:
         return None
-    if last[0].span.key is not None:
-        return part.source.edit(place, place, f"\n{' ' * (last[0].span.key.column - 1)}{text}")
-    dash = re.search(r"( *)-\s*\Z", part.source.text[: last[0].span.start])
-    return part.source.edit(place, place, f"\n{dash[1]}- {text}") if dash is not None else None
+    if last.span.key is not None:
+        return part.source.edit(place, place, f"\n{' ' * (last.span.key.column - 1)}{text}")
+    dash = _before(part.source.text, last.span.start, "-")
+    if dash is None:
+        return None
+    indent = dash - part.source.text.rfind("\n", 0, dash) - 1
+    return part.source.edit(place, place, f"\n{' ' * indent}- {text}")
 
 
 def deleted(tree: Node, path: DataPath) -> TextEdit | None:
@@ -114,16 +117,28 @@ def deleted(tree: Node, path: DataPath) -> TextEdit | None:
     part, around = tree.get(path), tree.get(path[:-1])
     if part is None or around is None or part.span.key is None or part.source != around.source:
         return None
-    if len(list(around.items())) == 1:
+    if around.size == 1:
         return deleted(tree, path[:-1])
     source, start, end = part.source, part.source.index(part.span.key), part.end
     if around.is_braced:
         behind = re.compile(r"\s*,\s*").match(source.text, end)
-        before = re.search(r"\s*,\s*\Z", source.text[:start])
         if behind is not None:
             return source.edit(start, behind.end(), "")
-        return source.edit(before.start(), end, "") if before is not None else None
+        comma = _before(source.text, start, ",")
+        return source.edit(_back_over_space(source.text, comma), end, "") if comma is not None else None
     return _lines_away(source, start, end)
+
+
+def _before(text: str, index: int, mark: str) -> int | None:
+    """Where the mark stands that nothing but white space separates from the character at an index."""
+    place = _back_over_space(text, index) - 1
+    return place if place >= 0 and text[place] == mark else None
+
+
+def _back_over_space(text: str, index: int) -> int:
+    while index > 0 and text[index - 1].isspace():
+        index -= 1
+    return index
 
 
 def _lines_away(source: Source, start: int, end: int) -> TextEdit | None:

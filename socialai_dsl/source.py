@@ -321,6 +321,18 @@ class Node:
         elif self.children is not None:
             yield from enumerate(self.children)
 
+    @property
+    def size(self) -> int:
+        """The number of children."""
+        return 0 if self.children is None else len(self.children)
+
+    @property
+    def last(self) -> Node | None:
+        """The last child, if there is one."""
+        if isinstance(self.children, dict):
+            return next(reversed(self.children.values()), None)
+        return self.children[-1] if self.children else None
+
     def walk(self, path: DataPath = ()) -> Iterator[tuple[DataPath, Node]]:
         """This part and all below it with their paths, parents first."""
         yield path, self

@@ -119,6 +119,9 @@ SCENARIOS: dict[str, Bomb] = {
         lambda n: _scenario("tests: {a: {play: [{do: [" + _each(n, lambda i: "Say hi, ") + "]}]}}\n"), 20_000
     ),
     "draws": Bomb(lambda n: _scenario("let:" + _listed(n, lambda i: f"v{i}: pick(1..9)", "  ")), 4_000),
+    "draws in braces": Bomb(
+        lambda n: _scenario("let: {" + _each(n, lambda i: f"v{i}: pick(1..9), ") + "}\n"), 4_000
+    ),
     "draws that lead to those above": Bomb(
         lambda n: _scenario(
             "let:" + _listed(n, lambda i: f"v{i}: {f'v{i - 1}' if i else 'pick(1..3)'}", "  ")
