@@ -192,6 +192,11 @@ def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> N
     before = len(list(bag))
     for name, split in suite.splits.items():
         _check_split(suite, name, split, resolved, bag)
+    if suite.held_out is not None and suite.tree is None:
+        message = (
+            "values of a `tree` are held out; a suite with `members` has splits with members of their own"
+        )
+        bag.error("S107", message, resolved.tree.key_span(("held_out",)))
     if suite.sweep is not None and suite.members is not None:
         _check_named(suite, suite.sweep, ("sweep",), resolved, bag)
     if len(list(bag)) > before:

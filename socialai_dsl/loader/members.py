@@ -203,8 +203,10 @@ def check_splits(suite: ResolvedFile) -> None:
     found = DiagnosticBag()
     if _mapping(suite.data, "tree") is not None:
         leaves = leaves_of(_part(suite.data, "tree"), suite.tree, DiagnosticBag())
-        for split in _splits(suite):
-            _split_leaves(suite, leaves, split, found)
+        if _are_known(suite, leaves, _held_out(suite), ("held_out",), found):
+            for split in (None, *_splits(suite)):
+                _split_leaves(suite, leaves, split, found)
+            _check_held_out(suite, leaves, found)
     else:
         for split in _splits(suite):
             for place in _member_places(suite, split):
@@ -341,7 +343,7 @@ def _leaf_members(suite: ResolvedFile, split: str | None, found: DiagnosticBag) 
             member = _member(suite, leaf.scenario, found)
             scenarios[leaf.scenario] = member.scenario if member is not None else None
     _check_parameters(suite, tree, leaves, scenarios, found)
-    played = _split_leaves(suite, leaves, split, found) if split is not None else leaves
+    played = _split_leaves(suite, leaves, split, found)
     made = (_leaf_member(suite, leaf, scenarios.get(leaf.scenario or ()), found) for leaf in played)
     return [member for member in made if member is not None]
 
@@ -400,24 +402,68 @@ def _check_parameters(
 
 
 def _split_leaves(
-    suite: ResolvedFile, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
+    suite: ResolvedFile, leaves: Sequence[Leaf], split: str | None, found: DiagnosticBag
 ) -> tuple[Leaf, ...]:
-    """The leaves of a split: with all the values of `only`, and not with all the values of `without`."""
-    chosen = _splits(suite).get(split)
-    if not isinstance(chosen, dict):
-        return tuple(leaves)
-    kept = tuple(leaves)
+    """The leaves of a split, or of the suite itself.
+
+    They have all the values of `only`, not all those of `without`, and none that is held out unless `only` names it.
+    """
+    chosen = _splits(suite).get(split) if split is not None else None
+    kept, named = tuple(leaves), _held_out(suite)
     for word, has in (("only", True), ("without", False)):
         wanted = _mapping(chosen, word)
         if wanted is None:
             continue
-        place: DataPath = ("splits", split, word)
-        if not _are_known(suite, leaves, wanted, place, found):
+        if not _are_known(suite, leaves, wanted, ("splits", str(split), word), found):
             return tuple(leaves)
         kept = tuple(leaf for leaf in kept if _has(leaf, wanted) is has)
+        if has:
+            named = {name: _besides(values, wanted.get(name)) for name, values in named.items()}
+    kept = tuple(leaf for leaf in kept if not _has_some(leaf, named))
     if not kept and leaves:
-        found.error("S504", f"no leaf is in the split `{split}`", suite.tree.key_span(("splits", split)))
+        message = f"no leaf is in the split `{split}`" if split is not None else "every leaf is held out"
+        place = ("splits", split) if split is not None else ("held_out",)
+        found.error("S504", message, suite.tree.key_span(place))
     return kept
+
+
+def _held_out(suite: ResolvedFile) -> dict[str, Data]:
+    return _mapping(suite.data, "held_out") or {}
+
+
+def _check_held_out(suite: ResolvedFile, leaves: Sequence[Leaf], found: DiagnosticBag) -> None:
+    """A leaf that is held out differs from all that are not in more than its name."""
+    held = _held_out(suite)
+    scenarios = {
+        leaf.scenario: _member(suite, leaf.scenario, DiagnosticBag())
+        for leaf in leaves
+        if held and leaf.scenario is not None
+    }
+    others: dict[str, Leaf] = {}
+    for leaf in sorted(leaves, key=lambda leaf: _has_some(leaf, held)):
+        named = scenarios.get(leaf.scenario or ())
+        member = _leaf_member(suite, leaf, named.scenario, DiagnosticBag()) if named is not None else None
+        if member is None:
+            continue
+        layout = suite.tree.at(member.layout).data if member.layout is not None else None
+        played = repr(
+            (member.scenario.path, member.scenario.data, sorted(member.scenario.params.items()), layout)
+        )
+        other = others.setdefault(played, leaf)
+        if _has_some(leaf, held) and not _has_some(other, held):
+            message = f"`{leaf.name}` is held out, and plays the same as `{other.name}`, which is not"
+            found.error("S107", message, suite.tree.key_span(("held_out",)))
+            return
+
+
+def _besides(values: Data, named: Data) -> Data:
+    """The values of a parameter that are not named."""
+    return [label for label in _labels(values) if named is None or label not in _labels(named)]
+
+
+def _has_some(leaf: Leaf, values: Mapping[str, Data]) -> bool:
+    """Whether a leaf has one of the values of a parameter, whichever."""
+    return any(leaf.labels.get(parameter) in _labels(labels) for parameter, labels in values.items())
 
 
 def _has(leaf: Leaf, wanted: Mapping[str, Data]) -> bool:

@@ -47,8 +47,9 @@ def keep_scenario(folder: Path, spec: str, loaded: Loaded) -> "MovedScenario":
     except ScenarioError:
         same = False
     if not same:
+        ships = f"name what ships without a path, such as {moved.ships[0]}, and " if moved.ships else ""
         raise UsageError(
-            f"{spec}: its files cannot be copied to {folder}; replace links by the files themselves"
+            f"{spec}: its files cannot be copied to {folder}; {ships}replace links by the files themselves"
         )
     return moved
 
@@ -139,11 +140,13 @@ class MovedScenario:
         scenario: as it is named from the new folder.
         texts: file in the new folder -> its text.
         names: how the old folder's files were called -> how they are called now.
+        ships: the names of those that ship.
     """
 
     scenario: str
     texts: Mapping[str, str]
     names: Mapping[str, str]
+    ships: Sequence[str] = ()
 
     @classmethod
     def of(cls, loaded: Loaded, spec: str, *more: Loaded) -> "MovedScenario":
@@ -160,17 +163,21 @@ class MovedScenario:
         if path.is_relative_to(shipped):
             return cls(path.relative_to(shipped).with_suffix("").as_posix() + rest, {}, {})
         texts, names = {}, {}
+        ships: dict[str, None] = {}
         every = [loaded, *more, *(member for one in (loaded, *more) for member in _members(one))]
         for name, file in (pair for one in every for pair in one.resolved.files.items()):
             there = Path(name).resolve()
-            if not there.is_file() or there.is_relative_to(shipped):
+            if there.is_relative_to(shipped):
+                ships[there.relative_to(shipped).with_suffix("").as_posix()] = None
+                continue
+            if not there.is_file():
                 continue
             if not there.is_relative_to(path.parent):
                 raise UsageError(f"{name}: lies outside the folder of {path.name}, so it cannot go along")
             new = f"{SCENARIO}/{there.relative_to(path.parent).as_posix()}"
             texts[new] = file.text
             names[name] = names[str(there)] = names[there.name] = new
-        return cls(f"{SCENARIO}/{path.name}{rest}", texts, names)
+        return cls(f"{SCENARIO}/{path.name}{rest}", texts, names, tuple(ships))
 
     def copy(self, out: Path) -> None:
         """Write the files."""

@@ -118,3 +118,8 @@ class Suite(Model):
         Discriminator(_form),
     ] = Field("union", description="the body actions in every member")
     splits: dict[Word, Split] = Field(default_factory=dict, description="chosen by ?split=NAME")
+    held_out: dict[Word, Labels] | None = Field(
+        None,
+        min_length=1,
+        description="parameter: value or values of the tree that only a split plays which names them in `only`",
+    )

@@ -50,6 +50,33 @@ def test_splits_hold_out_what_has_all_the_values_named() -> None:
     )
 
 
+FAMILY = (
+    "suite: mine\ntree: {scenario: lesson, introduction: [none, ask, gaze], "
+    "size: {small: {set: {room.size: 5}}, any: {}}}\n"
+    "held_out: {introduction: gaze, size: [small]}\n"
+    "splits:\n  gaze: {only: {introduction: gaze}}\n  small: {only: {size: small}}\n"
+    "  both: {only: {introduction: [ask, gaze], size: small}}\n  ask: {without: {introduction: none}}\n"
+)
+
+
+def test_what_is_held_out_is_played_where_a_split_names_it_alone() -> None:
+    Path("mine.yaml").write_text(FAMILY)
+    played = {split: suite(f"mine.yaml{split}").member_names for split in ("", "?split=ask", "?split=gaze")}
+    assert played == {
+        "": ("introduction=none,size=any", "introduction=ask,size=any"),
+        "?split=ask": ("introduction=ask,size=any",),
+        "?split=gaze": ("introduction=gaze,size=any",),
+    }
+    assert suite("mine.yaml?split=small").member_names == (
+        "introduction=none,size=small",
+        "introduction=ask,size=small",
+    )
+    assert suite("mine.yaml?split=both").member_names == (
+        "introduction=ask,size=small",
+        "introduction=gaze,size=small",
+    )
+
+
 def test_a_sweep_is_the_product_of_its_values_and_keeps_the_members_share() -> None:
     sizes = suite("sizes")
     assert len(sizes.members) == 7
@@ -174,6 +201,23 @@ def test_variants_are_passed_on_to_leaves() -> None:
         (
             "draw: in_sequence\nmembers: [{scenario: lesson, layout: {t: 3}}]",
             ["3:30: S107 an act begins where the one before it ends, so it has no `layout`"],
+        ),
+        (
+            "tree: {scenario: lesson, introduction: [ask, gaze]}\nheld_out: {introduction: gaz}",
+            ["3:26: S504 `gaz` is no value of `introduction` in the tree; did you mean `gaze`?"],
+        ),
+        (
+            "tree: {scenario: lesson, introduction: [ask, gaze]}\nheld_out: {introduction: [ask, gaze]}",
+            ["3:1: S504 every leaf is held out"],
+        ),
+        (
+            "tree: {scenario: lesson, size: {a: {}, b: {set: {room.size: 7}}, c: {set: {room.size: 7}}}}\n"
+            "held_out: {size: c}",
+            ["3:1: S107 `size=c` is held out, and plays the same as `size=b`, which is not"],
+        ),
+        (
+            "members: [errands]\nheld_out: {size: 5}",
+            ["3:1: S107 values of a `tree` are held out; a suite with `members` has splits with members of their own"],
         ),
         ("members: [{scenario: lesson, lay: {}}]",
          ["2:30: S101 unknown key `lay` in a member; did you mean `layout`?"]),

@@ -1,13 +1,17 @@
 """Names of run folders, files written in one go."""
 
 import contextlib
+import os
 from pathlib import Path
 
 import pytest
 
 from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import load
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.runs import folder as run_folder
+from socialai_dsl.runs.copies import keep_scenario
 from socialai_dsl.runs.folder import CONFIG, new_run_folder, scenario_folder_name
 from socialai_dsl.runs.versions import versions
 
@@ -46,6 +50,17 @@ def test_a_folder_with_a_run_is_not_overwritten(tmp_path: Path) -> None:
         new_run_folder(tmp_path / "new", "dance", 0),
     ):
         pass
+
+
+def test_what_ships_goes_along_by_its_name_and_not_by_a_path(tmp_path: Path) -> None:
+    own, to = tmp_path / "own.yaml", tmp_path / "a" / "folder"
+    to.mkdir(parents=True)
+    own.write_text("suite: own\nmembers: [dance]\n")
+    assert keep_scenario(to, str(own), load(str(own))).scenario == "scenario/own.yaml"
+    path = os.path.relpath(shipped_folder() / "dance.yaml", tmp_path)
+    own.write_text(f"suite: own\nmembers: [{path}]\n")
+    with pytest.raises(UsageError, match="name what ships without a path, such as dance, and"):
+        keep_scenario(to, str(own), load(str(own)))
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
