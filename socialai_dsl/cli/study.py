@@ -40,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--public", metavar="URL", help="the address that a proxy serves, such as https://study.example.org"
     )
+    run.add_argument(
+        "--embed",
+        action="append",
+        default=[],
+        metavar="ORIGIN",
+        help="let pages of this origin, such as https://lab.example.org, show the study; may be repeated",
+    )
     run.add_argument("--links", type=at_once, metavar="N", help="print links for N new participants")
     rehearse = commands.add_parser(
         "rehearse", help="let simulated participants take part, and say what came of it"
@@ -107,6 +114,7 @@ def _run(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
         host=arguments.host,
         port=arguments.port,
         public=arguments.public,
+        embed=arguments.embed,
         links=arguments.links or 0,
         say=lambda line: print(line, flush=True),
     )

@@ -18,7 +18,7 @@ from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
 from socialai_dsl.study.live import header_of, reset_of
 from socialai_dsl.study.log import FILE, Event, read_log
-from socialai_dsl.study.progress import Game, Participant, Progress
+from socialai_dsl.study.progress import Game, Participant, Progress, done_on
 
 Row = dict[str, Any]
 
@@ -26,6 +26,7 @@ COLUMNS: Final[dict[str, dict[str, str]]] = {
     "participants": {
         "participant": "id; names nobody",
         "group": "of the design, from 1; empty for who did not agree",
+        "agreed_at": "origin of the page that says that they agreed; empty for the study's own page",
         "order": "numbers of the blocks in the order in which the group plays them, from 1",
         "began": "when they agreed, UTC",
         "ended": "when they came to the end, UTC; empty for who did not",
@@ -213,29 +214,19 @@ class _Tables:
             if time and person and game.block != PRACTICE:
                 self._of[person].times.append(time["acted"] - time["shown"])
             action = event["acts"][seat]
-            movements = (*episode.arena.actions, "")
-            did = time.get("movement") or ("" if time or action is None else movements[action[0]])
-            self._rows["steps"].append(
-                {
-                    "participant": person,
-                    "game": game.id,
-                    "trial": event["episode"] + 1,
-                    "step": event["t"] + 1,
-                    "seat": seat,
-                    "by": event["by"][seat],
-                    "movement": did,
-                    "said": time.get("said") or "",
-                    "heard": "\n".join(line for t, line in episode.heard[seat] if t == episode.t),
-                    "action": "" if action is None else " ".join(map(str, action)),
-                    "shown_ms": time.get("shown", ""),
-                    "acted_ms": time.get("acted", ""),
-                    "reaction_ms": round(time["acted"] - time["shown"], 3) if time else "",
-                    "connection": time.get("connection", ""),
-                    "time": event["time"],
-                    "mono": event["mono"],
-                    "server": self._server,
-                }
-            )
+            done = done_on(seat, event, episode.arena.actions)
+            row = {
+                "participant": person,
+                "game": game.id,
+                "trial": event["episode"] + 1,
+                "seat": seat,
+                "heard": "\n".join(line for t, line in episode.heard[seat] if t == episode.t),
+                "action": "" if action is None else " ".join(map(str, action)),
+                **done,
+                "mono": event["mono"],
+                "server": self._server,
+            }
+            self._rows["steps"].append({column: row[column] for column in COLUMNS["steps"]})
 
     def _ended(self, game: Game, event: Event) -> None:
         going = self._going.pop(game.id)
@@ -255,7 +246,6 @@ class _Tables:
             if game.block != PRACTICE:
                 of.episodes += 1
             person = self._progress.people[who]
-            order = self._loaded.design.orders[(person.group or 1) - 1]
             others = [f"{other}={one}" for other, one in game.seats.items() if other != seat]
             self._rows["episodes"].append(
                 {
@@ -264,7 +254,7 @@ class _Tables:
                     "block": block_name(self._loaded, game.block),
                     "scenario": self._loaded.played[game.block].name,
                     "program": self._arenas[game.block].program.sha256,
-                    "position": 0 if game.block == PRACTICE else order.index(game.block) + 1,
+                    "position": self._progress.position(person, game),
                     "trial": event["episode"] + 1,
                     "room": game.episode.room if game.episode is not None else "",
                     "seat": seat,
@@ -306,6 +296,7 @@ class _Tables:
         return {
             "participant": person.id,
             "group": person.group or "",
+            "agreed_at": person.agreed_at or "",
             "order": " ".join(str(number + 1) for number in order),
             "began": person.began or "",
             "ended": person.ended or "",
@@ -322,6 +313,8 @@ class _Tables:
 
     def _reasons(self, person: Participant, of: _Of) -> Iterable[str]:
         rules = self._loaded.study.exclude
+        if person.simulated:
+            yield "simulated"
         if rules.unfinished and not person.ended:
             yield "declined" if person.declined else "unfinished"
         if rules.practice and person.practised is False:

@@ -20,8 +20,10 @@ from socialai_dsl.schema.study import PERSON, WHO, Question
 from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, FORMAT, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
-from socialai_dsl.study.progress import Game, Participant, Progress
+from socialai_dsl.study.progress import Game, Participant, Progress, done_on
 from trainer.shipped import PREFIX
+
+Row = dict[str, Any]
 
 MOST_LINES: Final = 200
 """How many of the last lines that were heard a page shows."""
@@ -40,6 +42,7 @@ class Page:
         person: whose. send: takes what is to be shown. leave: closes the connection with a code and words.
         connection: which of the participant's it is, from 1. sign: when it was last heard.
         knows: the game of which it has been told what can be done and said.
+        elsewhere: whether it is a page of somebody else, which keeps data of its own.
     """
 
     person: str
@@ -48,6 +51,7 @@ class Page:
     connection: int
     sign: float
     knows: str | None = None
+    elsewhere: bool = False
     _tokens: float = _BURST
 
     def may_speak(self, now: float) -> bool:
@@ -228,15 +232,35 @@ class Live:
             raise
         return person
 
+    def agree(self, person: str, at: str, simulated: bool) -> bool:
+        """Take it that a participant has agreed on a page of somebody else; whether they take part.
+
+        Args:
+            person: who it is; whoever was asked before is not asked again.
+            at: the origin of that page.
+            simulated: whether it says that nobody sits there.
+        """
+        one = self.progress.people[person]
+        if self.progress.stage(one)[0] == "consent":
+            if self.full():
+                return False
+            group = self.progress.next_group(self._dropped())
+            self._do("agreed", participant=person, group=group, at=at, simulated=simulated)
+        return True
+
     async def come(
-        self, person: str, send: Callable[[Screen], None], leave: Callable[[int, str], None]
+        self,
+        person: str,
+        send: Callable[[Screen], None],
+        leave: Callable[[int, str], None],
+        elsewhere: bool = False,
     ) -> Page:
         """Let a participant's page take part; one that was open before is closed."""
         former = self.pages.get(person)
         if former is not None:
             former.leave(TAKEN, "")
         connection = self.progress.people[person].connections + 1
-        page = self.pages[person] = Page(person, send, leave, connection, self._clock())
+        page = self.pages[person] = Page(person, send, leave, connection, self._clock(), elsewhere=elsewhere)
         self._do("came", participant=person, connection=connection)
         self._enter(self.progress.people[person])
         await self._show([person])
@@ -629,11 +653,52 @@ class Live:
             assert episode.ending is not None, "internal: the episode has ended"
             told = practice or (block is not None and block.feedback == "outcome")
             found |= {"ended": True, "success": episode.ending.success[seat] if told else None}
+            if page.elsewhere:
+                found["record"] = self._record(person, game, running, told)
         if page.knows != game.id:
             page.knows = game.id
             arena = self.arenas[game.block]
             found |= {"actions": list(arena.actions), "phrases": arena.phrases}
         return found
+
+    def _record(self, person: Participant, game: Game, running: Running, told: bool) -> Row:
+        """What the tables have of an episode that has ended, as far as whoever played it may know it.
+
+        Args:
+            person: who played it.
+            game: that it belongs to.
+            running: the episode.
+            told: whether it is told how it ended.
+        """
+        played, episode, seat = game.episode, running.episode, self.progress.seat_of(game, person.id)
+        assert played is not None, "internal: a game begins with an episode"
+        assert episode.ending is not None, "internal: the episode has ended"
+        acts = []
+        for step in played.steps:
+            lines = [line for t, line in episode.heard[seat] if t == step["t"] + 1]
+            acts.append({**done_on(seat, step, episode.arena.actions), "heard": "\n".join(lines)})
+        return {
+            "participant": person.id,
+            "game": game.id,
+            "position": self.progress.position(person, game),
+            "trial": played.number + 1,
+            "trials": self.progress.episodes(game),
+            "episode": person.played,
+            "more": self.progress.has_more(person, game),
+            "steps": episode.t,
+            "own_steps": sum(act["by"] == PERSON for act in acts),
+            "success": episode.ending.success[seat] if told else None,
+            "outcome": episode.ending.outcome if told else None,
+            "return": episode.ending.returns[seat] if told else None,
+            "acts": acts,
+        }
+
+    def gone_on_from(self, person: str) -> int:
+        """How many episodes a participant has played and gone on from."""
+        one = self.progress.people[person]
+        game = self.progress.games.get(one.game or "")
+        there = game is not None and game.episode is not None and game.episode.ended is not None
+        return one.played - there
 
     def _html(self, text: str) -> str:
         """Markdown as HTML, in which tags are shown as they are written."""

@@ -67,6 +67,21 @@ class Answers(_Message):
     ]
 
 
+class Join(_Message):
+    """Take part from a page of somebody else, on which the participant has agreed.
+
+    Attributes:
+        id: by which that page knows the participant. code: that the page was given when it joined before.
+        consented: that they have agreed there. simulated: whether nobody sits there.
+    """
+
+    do: Literal["join"]
+    id: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    code: Annotated[str, Field(max_length=80)] | None = None
+    consented: Literal[True]
+    simulated: bool = False
+
+
 Message = Beat | Go | Decline | Act | Answers
 _MESSAGES: Final[TypeAdapter[Message]] = TypeAdapter(Annotated[Message, Field(discriminator="do")])
 
@@ -75,6 +90,14 @@ def parsed(content: str | bytes) -> Message | None:
     """The message that a text is; None if it is none."""
     try:
         return _MESSAGES.validate_json(content)
+    except (ValidationError, UnicodeDecodeError):
+        return None
+
+
+def joining(content: str | bytes) -> Join | None:
+    """How a page of somebody else takes part; None if the text does not say it."""
+    try:
+        return Join.model_validate_json(content)
     except (ValidationError, UnicodeDecodeError):
         return None
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
 from socialai_dsl.schema.study import PERSON
@@ -64,6 +64,9 @@ class Participant:
         declined: whether they did not agree. game: that they play. rounds: of practice that have ended.
         practised: whether they reached the criterion. won: successes that count. answered: questions.
         connections: how often their page has been opened. since: time of their last event.
+        played: episodes that have ended, with those of practice.
+        agreed_at: the origin of the page that says that they have agreed; None for the study's own.
+        simulated: whether that page says that nobody sits there.
     """
 
     id: str
@@ -80,6 +83,9 @@ class Participant:
     began: str | None = None
     ended: str | None = None
     since: str | None = None
+    played: int = 0
+    agreed_at: str | None = None
+    simulated: bool = False
 
 
 class Progress:
@@ -176,6 +182,17 @@ class Progress:
         """The seat that a participant has in a game."""
         return next(seat for seat, who in game.seats.items() if who == person)
 
+    def position(self, person: Participant, game: Game) -> int:
+        """The place of a game's block in a participant's order, from 1; 0 of practice."""
+        order = self.loaded.design.orders[(person.group or 1) - 1]
+        return 0 if game.block == PRACTICE else order.index(game.block) + 1
+
+    def has_more(self, person: Participant, game: Game) -> bool:
+        """Whether a participant plays another episode after the present one of a game."""
+        assert game.episode is not None, "internal: a game begins with an episode"
+        later = self.stages(person)[person.stage + 1 :]
+        return game.episode.number + 1 < self.episodes(game) or any(stage == "play" for stage, _ in later)
+
     def passed(self, game: Game) -> bool:
         """Whether a round of practice reached the criterion, or there is none."""
         practice = self.study.practice
@@ -202,6 +219,7 @@ class Progress:
                 )
             case "agreed" if person is not None:
                 person.group, person.stage, person.began = event["group"], 1, event["time"]
+                person.agreed_at, person.simulated = event.get("at"), event.get("simulated", False)
             case "declined" if person is not None:
                 person.declined, person.stage = True, 1
             case "came" if person is not None:
@@ -255,9 +273,35 @@ class Progress:
                 game.episode.ended = event
                 game.results.append(event["success"])
                 for seat, who in game.seats.items():
+                    if who in self.people:
+                        self.people[who].played += 1
                     if game.block != PRACTICE and who in self.people and who not in game.gone:
                         self.people[who].won += bool(event["success"].get(seat))
             case "gone":
                 self.games[event["game"]].gone.add(event["participant"])
             case "back":
                 self.games[event["game"]].gone.discard(event["participant"])
+
+
+def done_on(seat: str, event: Event, actions: Sequence[str]) -> dict[str, Any]:
+    """What was done on a seat in a step, in columns of the table `steps`.
+
+    Args:
+        seat: whose.
+        event: the event `step`.
+        actions: the words for movements.
+    """
+    time, action = event["times"].get(seat, {}), event["acts"][seat]
+    movements = (*actions, "")
+    did = time.get("movement") or ("" if time or action is None else movements[action[0]])
+    return {
+        "step": event["t"] + 1,
+        "by": event["by"][seat],
+        "movement": did,
+        "said": time.get("said") or "",
+        "shown_ms": time.get("shown", ""),
+        "acted_ms": time.get("acted", ""),
+        "reaction_ms": round(time["acted"] - time["shown"], 3) if time else "",
+        "connection": time.get("connection", ""),
+        "time": event["time"],
+    }

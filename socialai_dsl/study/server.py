@@ -11,9 +11,9 @@ import logging
 import os
 import secrets
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -24,6 +24,7 @@ from starlette.websockets import WebSocket
 from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.studies import PICTURES, LoadedStudy
 from socialai_dsl.study.live import Live
+from socialai_dsl.study.messages import joining
 from socialai_dsl.study.words import words_of
 from socialai_dsl.web.connection import close, contents, send
 from socialai_dsl.web.pages import Address, guarded, page, static_file
@@ -31,12 +32,22 @@ from socialai_dsl.web.pages import Address, guarded, page, static_file
 KEY: Final = "key"
 RECRUITED: Final = "recruited.csv"
 UNKNOWN: Final = 4404
+REFUSED: Final = 4403
 _TICK: Final = 0.25
 _MOST_JOINING: Final = 200
 """How many may join at once; after that as many in a second."""
+_MOST_SECONDS: Final = 20
+"""In which a page of somebody else has to say for whom it takes part."""
 _MOST_WAITING: Final = 64
 """Screens that wait to be sent to a page; one that reads none of so many is closed."""
-_OWN: Final = ("old.js", "study.css", "study.js")
+_OWN: Final = ("connection.js", "old.js", "screen.js", "study.css", "study.js")
+
+
+class _Refusal(NamedTuple):
+    """Why somebody may not take part: the name of the text that says it, and the status."""
+
+    word: str
+    status: int
 
 
 class StudyServer:
@@ -45,6 +56,7 @@ class StudyServer:
     Args:
         loaded: the study. folder: holds everything that is stored. host: the address that is listened at.
         public: what a proxy is asked for, such as `https://study.example.org`.
+        embed: origins of pages of other servers that may let people take part, such as `https://lab.example.org`.
         clock: seconds that never go back, by which others are waited for.
 
     Attributes:
@@ -61,11 +73,12 @@ class StudyServer:
         folder: Path,
         host: str,
         public: str | None = None,
+        embed: Collection[str] = (),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._loaded, self._folder = loaded, folder
         self._words = words_of(loaded.study.language)
-        self._address = Address(host, public)
+        self._address = Address(host, public, embed)
         self.live = Live(loaded, folder, clock)
         self._key = _key(folder / KEY)
         self._recruited = _recruited(folder / RECRUITED)
@@ -80,6 +93,7 @@ class StudyServer:
                 Route("/static/{name}", self._static),
                 Route("/picture/{number:int}", self._picture),
                 WebSocketRoute("/seat/{code}", self._seat),
+                WebSocketRoute("/embed", self._embedded),
             ],
             lifespan=self._lifespan,
         )
@@ -94,10 +108,14 @@ class StudyServer:
 
     async def invite(self) -> str:
         """The path of the link of a new participant. Raises OSError where that cannot be stored."""
+        return f"/p/{await self._joined()}"
+
+    async def _joined(self) -> str:
+        """The secret of a new participant. Raises OSError where that cannot be stored."""
         person = await self.live.join()
         code = self.code(person)
         self._codes[code] = person
-        return f"/p/{code}"
+        return code
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
@@ -129,34 +147,38 @@ class StudyServer:
             return _refused()
         if request.method == "HEAD":  # asks whether there is something, and does not come
             return guarded(Response())
-        async with self._joining:
-            return await self._joined(request)
+        given = request.query_params.get(self._loaded.study.recruit.id, "")[:200]
+        found = await self._admitted(given)
+        return self._said(*found) if isinstance(found, _Refusal) else _to(f"/p/{found}")
 
-    async def _joined(self, request: Request) -> Response:
-        recruit = self._loaded.study.recruit
-        given = request.query_params.get(recruit.id, "")[:200]
-        known = self._recruited.get(given) if given else None
-        if known is not None:
-            if recruit.on_return == "refuse":
-                return self._said("again", 403)
-            return _to(f"/p/{self.code(known)}")
-        if self.live.full():
-            return self._said("full", 403)
-        if self._may_join < 1:
-            return self._said("fast", 429)
-        self._may_join -= 1
-        path = await self.invite()
-        if given:
-            self._remember(given, self._codes[path.removeprefix("/p/")])
-        return _to(path)
+    async def _admitted(self, given: str) -> str | _Refusal:
+        """The secret of whoever comes by an id: the one they have, or that of a new participant."""
+        async with self._joining:
+            known = self._recruited.get(given) if given else None
+            if known is not None:
+                if self._loaded.study.recruit.on_return == "refuse":
+                    return _Refusal("again", 403)
+                return self.code(known)
+            if self.live.full():
+                return _Refusal("full", 403)
+            if self._may_join < 1:
+                return _Refusal("fast", 429)
+            self._may_join -= 1
+            try:
+                code = await self._joined()
+                if given:
+                    self._remember(given, self._codes[code])
+            except OSError:
+                return _Refusal("full_disk", 507)
+            return code
 
     def _remember(self, given: str, person: str) -> None:
         """Keep a platform's id, apart from the data."""
-        self._recruited[given] = person
         with open(self._folder / RECRUITED, "a", encoding="utf-8", newline="", opener=_private) as file:
             csv.writer(file).writerow((person, given))
             file.flush()
             os.fsync(file.fileno())
+        self._recruited[given] = person
 
     async def _page(self, request: Request) -> Response:
         if not self._is_ours(request):
@@ -201,6 +223,60 @@ class StudyServer:
         if person is None:
             await close(socket, UNKNOWN)
             return
+        await self._take_part(socket, person)
+
+    async def _embedded(self, socket: WebSocket) -> None:
+        """Let a page of somebody else let a participant take part, until the connection ends."""
+        if not self._address.is_own(socket.headers.get("host")):
+            await close(socket, 1008)
+            return
+        await socket.accept()
+        origin = socket.headers.get("origin")
+        if origin is None or not self._address.admits(origin):
+            await self._refuse(socket, "origin", origin=origin or "null")
+            return
+        try:
+            async with asyncio.timeout(_MOST_SECONDS):
+                message = joining(await anext(contents(socket), ""))
+        except TimeoutError:
+            message = None
+        if message is None:
+            await self._refuse(socket, "consent")
+            return
+        code = message.code or await self._admitted(message.id or "")
+        if isinstance(code, str):
+            if code not in self._codes:
+                code = _Refusal("forgotten", 404)
+            elif not self.live.agree(self._codes[code], origin, message.simulated):
+                code = _Refusal("full", 403)
+        if isinstance(code, _Refusal):
+            await self._refuse(socket, code.word)
+            return
+        person = self._codes[code]
+        joined = {
+            "do": "joined",
+            "code": code,
+            "language": self._loaded.study.language,
+            "words": self._words,
+            "done": self.live.gone_on_from(person),
+        }
+        await self._take_part(socket, person, joined)
+
+    async def _refuse(self, socket: WebSocket, word: str, **values: str) -> None:
+        """Say why a page may not let anybody take part, and close."""
+        await send(
+            socket, json.dumps({"do": "refused", "why": word, "say": self._words[word].format(**values)})
+        )
+        await close(socket, REFUSED)
+
+    async def _take_part(self, socket: WebSocket, person: str, first: dict[str, Any] | None = None) -> None:
+        """Let a participant take part until the connection ends.
+
+        Args:
+            socket: to their page.
+            person: who it is.
+            first: what a page of somebody else is told before everything else; None for our own page.
+        """
         screens: asyncio.Queue[str] = asyncio.Queue()
         closing: set[asyncio.Task[None]] = set()
 
@@ -218,7 +294,9 @@ class StudyServer:
                 await send(socket, await screens.get())
 
         writing = asyncio.create_task(write())
-        own = await self.live.come(person, show, leave)
+        if first is not None:
+            show(first)
+        own = await self.live.come(person, show, leave, elsewhere=first is not None)
         try:
             async for content in contents(socket):
                 await self.live.hear(own, content)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
@@ -17,6 +17,7 @@ from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.runs.lock import HeldError, hold
 from socialai_dsl.study.messages import LARGEST
 from socialai_dsl.study.server import StudyServer
+from socialai_dsl.web.pages import origin_of
 
 _WRITER: Final = "server"
 
@@ -27,6 +28,7 @@ def serve(
     host: str,
     port: int,
     public: str | None,
+    embed: Collection[str],
     links: int,
     say: Callable[[str], None],
 ) -> None:
@@ -38,6 +40,7 @@ def serve(
         host: the address to listen at.
         port: likewise; 0 takes a free one.
         public: the address that a proxy serves.
+        embed: origins of pages of other servers that may let people take part.
         links: how many new participants are told their links.
         say: takes lines for whoever runs the study.
 
@@ -49,19 +52,39 @@ def serve(
         urlsplit(public).scheme not in ("http", "https") or not urlsplit(public).netloc
     ):
         raise OptionError("public", f"got {public!r}, expected an address such as https://study.example.org")
+    origins = [_origin(address, loaded) for address in embed]
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with hold(folder, _WRITER):
             listening = _listen(host, port)
-            server = StudyServer(loaded, folder, host, public)
+            server = StudyServer(loaded, folder, host, public, origins)
             shown = f"[{host}]" if ":" in host else "127.0.0.1" if host == "0.0.0.0" else host
             address = (public or f"http://{shown}:{listening.getsockname()[1]}").rstrip("/")
             say(f"study {loaded.study.study}: {address}/join\nall that is stored: {folder}")
+            for origin in origins:
+                say(f"pages of {origin} may let people take part")
             say("Ctrl-C ends it, and the same command goes on")
             with contextlib.suppress(KeyboardInterrupt):
                 asyncio.run(_served(server, listening, address, links, say))
     except HeldError as error:
         raise UsageError(str(error)) from None
+
+
+def _origin(address: str, loaded: LoadedStudy) -> str:
+    """The origin of pages that may let people take part in a study. Raises OptionError."""
+    origin, study = origin_of(address), loaded.study
+    if origin is None:
+        raise OptionError(
+            "embed", f"got {address!r}, expected the origin of a page, such as https://lab.example.org"
+        )
+    own = [f"`{key}`" for key in ("instructions", "questions") if getattr(study, key)]
+    own += ["`questions` of blocks"] if any(block.questions for block in study.blocks) else []
+    if own:
+        raise OptionError(
+            "embed",
+            f"{study.study} has {' and '.join(own)}, which a page that embeds a study shows itself; take them out",
+        )
+    return origin
 
 
 async def _served(

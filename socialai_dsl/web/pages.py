@@ -16,6 +16,7 @@ from socialai_dsl.traces.scripts import static_text
 Answer = TypeVar("Answer", bound=Response)
 
 _LOOPBACK: Final = ("127.0.0.1", "::1")
+_PORTS: Final = {"http": 80, "https": 443}
 _SHARED: Final = ("dom.js", "panels.js", "room.js", "seat.js", "tiles.js", "trace.js", "pages.css")
 _PAGE: Final = """<!doctype html>
 <html lang="{language}">
@@ -98,10 +99,12 @@ class Address:
     Args:
         host: that is listened at.
         public: what a proxy is asked for, such as `https://study.example.org`; then nothing else is answered.
+        admitted: origins of other pages that may open a connection where `admits` is asked.
     """
 
-    def __init__(self, host: str, public: str | None = None) -> None:
+    def __init__(self, host: str, public: str | None = None, admitted: Collection[str] = ()) -> None:
         self._host, self._public = host, None if public is None else public.rstrip("/")
+        self._admitted = frozenset(admitted)
 
     def is_own(self, host: str | None) -> bool:
         """Whether a page was asked for under our own address, not under a name that leads here."""
@@ -117,3 +120,21 @@ class Address:
     def comes_from_us(self, host: str | None, origin: str | None) -> bool:
         """Whether a connection is opened by one of our own pages."""
         return self.is_own(host) and origin == (self._public or f"http://{host}")
+
+    def admits(self, origin: str | None) -> bool:
+        """Whether a connection is opened by a page of another origin that is admitted."""
+        return origin in self._admitted
+
+
+def origin_of(address: str) -> str | None:
+    """The origin of a page as browsers send it, such as `https://lab.example.org`; None if the address is not one."""
+    try:
+        parts = urlsplit(address)
+        port = parts.port
+    except ValueError:
+        return None
+    whole = parts.path in ("", "/") and not (parts.query or parts.fragment or "@" in parts.netloc)
+    if parts.scheme not in _PORTS or not parts.hostname or not whole:
+        return None
+    name = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+    return f"{parts.scheme}://{name}" + (f":{port}" if port not in (None, _PORTS[parts.scheme]) else "")

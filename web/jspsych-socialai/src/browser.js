@@ -1,0 +1,2 @@
+/** For pages that load jsPsych by a script: what the plugin takes from it. */
+export const { ParameterType } = globalThis.jsPsychModule;
