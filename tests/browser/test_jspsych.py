@@ -220,6 +220,22 @@ def test_trials_end_where_the_study_has_no_episode_left(page: Page, lab: str, st
     assert [trial["status"] for trial in over(page)] == ["played", "played", "over"]
 
 
+def test_an_episode_whose_trial_the_experiment_ends_goes_on_in_the_next_trial(
+    page: Page, lab: str, study: Start
+) -> None:
+    experiment(page, lab, *[{"server": study(ALONE), "consented": True}] * 2)
+    page.get_by_text("Step 0", exact=True).wait_for()
+    page.keyboard.press("ArrowLeft")
+    page.get_by_text("Step 1", exact=True).wait_for()
+    page.evaluate("jsPsych.finishTrial({cut: true})")
+    page.wait_for_function("jsPsych.getProgress().current_trial_global === 1")
+    page.get_by_text("Step 1", exact=True).wait_for()
+    page.keyboard.press("x")
+    page.get_by_role("button", name=WORDS["next"]).click()
+    first, second = over(page)
+    assert (first["cut"], second["trial"], second["steps"]) == (True, 1, 2)
+
+
 def bad(browser: Browser) -> tuple[Page, Any]:
     """A page on which scripts may complain."""
     context = browser.new_context()
@@ -236,7 +252,11 @@ def bad(browser: Browser) -> tuple[Page, Any]:
             "parameters",
             'server: got "study.example.org", expected an address',
         ),
-        ({"participant": ""}, "parameters", 'participant: got "", expected null, or 1 to 200 characters'),
+        (
+            {"participant": ""},
+            "parameters",
+            'participant: got "", expected null, or a text of 1 to 200 characters',
+        ),
         ({"serve": 1}, "parameters", "got the parameter serve, expected server, consented, participant"),
     ],
 )

@@ -145,6 +145,10 @@ def test_an_episode_that_has_ended_is_told_as_the_tables_have_it(feedback: str, 
     assert [(one["episode"], one["more"], one["trials"]) for one in records] == [(1, True, 2), (2, False, 2)]
     tables = study_data(loaded, out).tables
     told = {"success", "outcome", "return"}
+    key = {"participant", "game", "position", "trial", "trials", "episode", "more"}
+    assert all({*record} == key | told | {"steps", "own_steps", "acts"} for record in records), (
+        "no room, no seat, no scenario, and nothing of others"
+    )
     for record, row in zip(records, tables["episodes"], strict=True):
         for name in {*record} & {*row}:
             assert record[name] == (None if feedback == "none" and name in told else row[name]), name
@@ -152,6 +156,29 @@ def test_an_episode_that_has_ended_is_told_as_the_tables_have_it(feedback: str, 
         assert record["acts"] == [
             {name: step[name] for name in act} for step, act in zip(steps, record["acts"], strict=True)
         ]
+
+
+def test_practice_is_played_in_its_rounds_before_what_counts(folder: Path) -> None:
+    practice = "practice: {scenario: talkitout_no_liar, episodes: 1, until: {success: 1}, rounds: 2}\n"
+    loaded = loaded_study(PLAYED.replace("episodes: 2", "episodes: 1") + practice, folder)
+
+    async def play() -> list[dict[str, Any]]:
+        live = Live(loaded, folder)
+        person = await live.join()
+        live.agree(person, LAB, simulated=True)
+        one, records = Taking(live, person), []
+        one.page = await live.come(person, one.screens.append, lambda code, why: None, elsewhere=True)
+        while one.now["do"] == "play":
+            await one.act("done")
+            records.append(one.now["record"])
+            await one.go()
+        await live.close()
+        return records
+
+    found = [(one["position"], one["trial"], one["episode"], one["more"]) for one in run(play)]
+    assert found == [(0, 1, 1, True), (0, 1, 2, True), (1, 1, 3, False)]
+    (person,) = study_data(loaded, folder).tables["participants"]
+    assert (person["excluded"], person["practice_rounds"]) == ("simulated", 2)
 
 
 def test_our_own_page_gets_no_record(place: Path, tmp_path: Path) -> None:

@@ -975,7 +975,7 @@ var Session = class {
     this.now = void 0;
     this.screen = void 0;
     this.connection = void 0;
-    this.trial = void 0;
+    this.present = void 0;
     this.timer = void 0;
     this.host = make("div", { class: "jspsych-socialai" });
     this.shadow = this.host.attachShadow({ mode: "open" });
@@ -983,9 +983,13 @@ var Session = class {
     sheet.replaceSync(pages_default.replace(":root", ":host") + study_default + HOST);
     this.shadow.adoptedStyleSheets = [sheet];
   }
+  /** The trial that is shown; one that the experiment has ended by itself is none. */
+  get trial() {
+    return this.host.isConnected ? this.present : void 0;
+  }
   remembered() {
     try {
-      return JSON.parse(sessionStorage.getItem(this.key) ?? "") ?? void 0;
+      return JSON.parse(sessionStorage.getItem(this.key) ?? "");
     } catch {
       return { code: null, episodes: [] };
     }
@@ -998,8 +1002,7 @@ var Session = class {
   }
   /** Let the participant play what comes next. @param {HTMLElement} display @param {Trial} trial */
   begin(display, trial) {
-    this.trial = trial;
-    display.replaceChildren(this.host);
+    this.place(display, trial);
     if (this.connection && this.screen?.offline) return this.wait();
     this.screen?.clear();
     if (this.connection) return this.proceed();
@@ -1014,6 +1017,11 @@ var Session = class {
       this.fail("server", `${this.server}: ${/** @type {Error} */
       error.message}`);
     }
+  }
+  /** @param {HTMLElement} display @param {Trial} trial */
+  place(display, trial) {
+    this.present = trial;
+    display.replaceChildren(this.host);
   }
   /** End the trial unless the server answers in time. */
   wait() {
@@ -1044,7 +1052,7 @@ var Session = class {
     this.done ??= said.done;
     this.words = said.words;
     this.host.lang = said.language;
-    this.screen ??= new Screen(said.words, (what) => this.connection?.send(what), { end: () => [] }, () => this.onward());
+    this.screen ??= new Screen(said.words, (what) => this.connection?.send(what), {}, () => this.onward());
     this.shadow.replaceChildren(this.screen.root);
   }
   /** Show what there is to see, or end the trial where there is nothing to play in it. */
@@ -1058,8 +1066,10 @@ var Session = class {
       if (!trial && now.record.more) return;
       screen.clear();
       screen.send({ do: "go", on: now.on });
-    } else if (trial && now.do === "end") this.end({ status: "over" });
-    else {
+    } else if (now.do === "end") {
+      this.hangUp();
+      this.end({ status: "over" });
+    } else {
       screen.show(now);
       trial?.shown?.();
     }
@@ -1078,14 +1088,17 @@ var Session = class {
   end(data) {
     const { trial } = this;
     clearTimeout(this.timer);
-    this.trial = this.timer = void 0;
+    this.present = this.timer = void 0;
     trial?.finish(data);
   }
-  /** Say why there is nothing to play; the next trial tries again. @param {string} why @param {string} message */
-  fail(why, message) {
+  hangUp() {
     clearTimeout(this.timer);
     this.connection?.close();
     this.connection = this.now = this.timer = void 0;
+  }
+  /** Say why there is nothing to play; the next trial tries again. @param {string} why @param {string} message */
+  fail(why, message) {
+    this.hangUp();
     if (why === "forgotten") {
       this.known = { code: null, episodes: [] };
       this.remember();
@@ -1209,8 +1222,7 @@ var JsPsychSocialai = class {
     const wrong = problem(trial), session = wrong ? new Session("", { id: null, simulated: false }) : sessionOf(this.jsPsych, trial, Boolean(react));
     const own = { patience: trial.connection_timeout, finish, shown: react && (() => react(session.shadow)) };
     if (!wrong) return session.begin(display, own);
-    session.trial = own;
-    display.replaceChildren(session.host);
+    session.place(display, own);
     session.fail("parameters", wrong);
   }
   /** @param {Trial} trial @param {"data-only" | "visual"} mode @param {Record<string, any>} options @param {() => void} on_load */
@@ -1272,7 +1284,7 @@ function problem(trial) {
   if (unknown.length) return `got the parameter ${unknown.join(", ")}, expected ${names.join(", ")}`;
   if (!/^https?:\/\//.test(server) || !URL.canParse(server)) return got("server", server, "an address such as https://study.example.org");
   if (consented !== true) return got("consented", consented, "true: nobody takes part who has not agreed");
-  if (participant !== null && !(typeof participant === "string" && participant && participant.length <= 200)) return got("participant", participant, "null, or 1 to 200 characters");
+  if (participant !== null && !(typeof participant === "string" && participant && participant.length <= 200)) return got("participant", participant, "null, or a text of 1 to 200 characters");
   if (!(connection_timeout > 0)) return got("connection_timeout", connection_timeout, "milliseconds");
 }
 module.exports = module.exports.default;

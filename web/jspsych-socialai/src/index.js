@@ -83,8 +83,7 @@ export default class JsPsychSocialai {
     const wrong = problem(trial), session = wrong ? new Session("", { id: null, simulated: false }) : sessionOf(this.jsPsych, trial, Boolean(react));
     const own = { patience: trial.connection_timeout, finish, shown: react && (() => react(session.shadow)) };
     if (!wrong) return session.begin(display, own);
-    session.trial = own;
-    display.replaceChildren(session.host);
+    session.place(display, own);
     session.fail("parameters", wrong);
   }
 
@@ -142,6 +141,6 @@ function problem(trial) {
   if (unknown.length) return `got the parameter ${unknown.join(", ")}, expected ${names.join(", ")}`;
   if (!/^https?:\/\//.test(server) || !URL.canParse(server)) return got("server", server, "an address such as https://study.example.org");
   if (consented !== true) return got("consented", consented, "true: nobody takes part who has not agreed");
-  if (participant !== null && !(typeof participant === "string" && participant && participant.length <= 200)) return got("participant", participant, "null, or 1 to 200 characters");
+  if (participant !== null && !(typeof participant === "string" && participant && participant.length <= 200)) return got("participant", participant, "null, or a text of 1 to 200 characters");
   if (!(connection_timeout > 0)) return got("connection_timeout", connection_timeout, "milliseconds");
 }

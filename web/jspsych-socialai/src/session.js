@@ -26,7 +26,7 @@ export class Session {
     /** @type {Reply | undefined} */ this.now = undefined;
     /** @type {Screen | undefined} */ this.screen = undefined;
     /** @type {Connection | undefined} */ this.connection = undefined;
-    /** @type {Trial | undefined} */ this.trial = undefined;
+    /** @type {Trial | undefined} */ this.present = undefined;
     /** @type {ReturnType<typeof setTimeout> | undefined} */ this.timer = undefined;
     this.host = make("div", { class: "jspsych-socialai" });
     this.shadow = this.host.attachShadow({ mode: "open" });
@@ -35,9 +35,14 @@ export class Session {
     this.shadow.adoptedStyleSheets = [sheet];
   }
 
+  /** The trial that is shown; one that the experiment has ended by itself is none. */
+  get trial() {
+    return this.host.isConnected ? this.present : undefined;
+  }
+
   remembered() {
     try {
-      return JSON.parse(sessionStorage.getItem(this.key) ?? "") ?? undefined;
+      return JSON.parse(sessionStorage.getItem(this.key) ?? "");
     } catch {
       return { code: null, episodes: [] };
     }
@@ -51,8 +56,7 @@ export class Session {
 
   /** Let the participant play what comes next. @param {HTMLElement} display @param {Trial} trial */
   begin(display, trial) {
-    this.trial = trial;
-    display.replaceChildren(this.host);
+    this.place(display, trial);
     if (this.connection && this.screen?.offline) return this.wait();
     this.screen?.clear();
     if (this.connection) return this.proceed();
@@ -66,6 +70,12 @@ export class Session {
     } catch (error) {
       this.fail("server", `${this.server}: ${/** @type {Error} */ (error).message}`); // such as from https to http
     }
+  }
+
+  /** @param {HTMLElement} display @param {Trial} trial */
+  place(display, trial) {
+    this.present = trial;
+    display.replaceChildren(this.host);
   }
 
   /** End the trial unless the server answers in time. */
@@ -96,7 +106,7 @@ export class Session {
     this.done ??= said.done;
     this.words = said.words;
     this.host.lang = said.language;
-    this.screen ??= new Screen(said.words, (what) => this.connection?.send(what), { end: () => [] }, () => this.onward());
+    this.screen ??= new Screen(said.words, (what) => this.connection?.send(what), {}, () => this.onward());
     this.shadow.replaceChildren(this.screen.root);
   }
 
@@ -111,8 +121,10 @@ export class Session {
       if (!trial && now.record.more) return; // the next trial begins the next episode
       screen.clear();
       screen.send({ do: "go", on: now.on });
-    } else if (trial && now.do === "end") this.end({ status: "over" });
-    else {
+    } else if (now.do === "end") {
+      this.hangUp();
+      this.end({ status: "over" });
+    } else {
       screen.show(now);
       trial?.shown?.();
     }
@@ -133,15 +145,19 @@ export class Session {
   end(data) {
     const { trial } = this;
     clearTimeout(this.timer);
-    this.trial = this.timer = undefined;
+    this.present = this.timer = undefined;
     trial?.finish(data);
+  }
+
+  hangUp() {
+    clearTimeout(this.timer);
+    this.connection?.close();
+    this.connection = this.now = this.timer = undefined;
   }
 
   /** Say why there is nothing to play; the next trial tries again. @param {string} why @param {string} message */
   fail(why, message) {
-    clearTimeout(this.timer);
-    this.connection?.close();
-    this.connection = this.now = this.timer = undefined;
+    this.hangUp();
     if (why === "forgotten") {
       this.known = { code: null, episodes: [] };
       this.remember();
