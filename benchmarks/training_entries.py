@@ -11,10 +11,10 @@ import torch
 
 import socialai_dsl
 from benchmarks.training import PEERS, LongDialogue
-from trainer.config import RunConfig, configure
-from trainer.ppo import update
-from trainer.rollout import collect
-from trainer.session import Session, threads_of
+from socialai_dsl.trainer.config import RunConfig, configure
+from socialai_dsl.trainer.ppo import update
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session, threads_of
 
 
 @dataclass(frozen=True)

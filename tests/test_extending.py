@@ -10,9 +10,9 @@ import pytest
 
 from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
-from trainer import checkpoint as checkpoints
-from trainer.config import OWN, RunConfig
-from trainer.files import CHECKPOINTS
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.config import OWN, RunConfig
+from socialai_dsl.trainer.files import CHECKPOINTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 TEXT = PAGE.read_text(encoding="utf-8")

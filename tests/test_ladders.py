@@ -7,7 +7,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
 from socialai_dsl.cli.main import main
-from trainer.curricula import Leaves, build_curriculum
+from socialai_dsl.trainer.curricula import Leaves, build_curriculum
 
 FOLDER = Path(__file__).parents[1] / "experiments" / "ladders"
 LADDERS = sorted(FOLDER.glob("*_ladder.yaml"))

@@ -28,13 +28,13 @@ TEXT_SIDE = {
     "frontend",
 }
 
-CONFIG = "trainer.config"
+CONFIG = "socialai_dsl.trainer.config"
 """The options of a run: pydantic models without anything of the trainer behind them."""
 
-SHIPPED = "trainer.shipped"
+SHIPPED = "socialai_dsl.trainer.shipped"
 """The names and folders of the agents that ship, likewise."""
 
-FILES = "trainer.files"
+FILES = "socialai_dsl.trainer.files"
 """The names of what training writes, likewise."""
 
 # layer, a module or a package -> (layers of socialai_dsl it may import, third-party packages it may import)
@@ -214,7 +214,10 @@ def violations(path: Path, own: str) -> Iterator[str]:
     for name, line in imported(path):
         root, _, rest = name.partition(".")
         place = f"{path.relative_to(ROOT)}:{line}"
-        if root == "socialai_dsl":
+        if rest.split(".")[0] == "trainer":
+            if not {"trainer", name} & third_party:
+                yield f"{place}: layer {own!r} must not import {name}"
+        elif root == "socialai_dsl":
             target = layer_of(rest)
             if target not in internal | {own}:
                 yield f"{place}: layer {own!r} must not import {name}"
@@ -238,6 +241,8 @@ def test_the_trainer_sees_only_the_facade() -> None:
     for path, name, line in found:
         root, place = name.split(".")[0], f"{path.relative_to(ROOT)}:{line}"
         assert root not in {"numba", "llvmlite", "ctypes"}, f"{place}: imports {name}"
+        if name.startswith("socialai_dsl.trainer"):
+            root = "trainer"
         if path.name in ("config.py", "files.py", "shipped.py"):
             allowed = root == "pydantic" or root in sys.stdlib_module_names
             assert allowed, f"{place}: imports {name}"
@@ -281,8 +286,10 @@ def graph(*packages: str) -> dict[str, set[str]]:
 
 
 def name_of(path: Path) -> str:
-    """`socialai_dsl/compiler/__init__.py` -> `socialai_dsl.compiler`."""
+    """`socialai_dsl/compiler/__init__.py` -> `socialai_dsl.compiler`, `trainer/a.py` -> `socialai_dsl.trainer.a`."""
     parts = path.relative_to(ROOT).with_suffix("").parts
+    if parts[0] == "trainer":
+        parts = ("socialai_dsl", *parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
@@ -300,12 +307,12 @@ def test_every_module_can_be_imported_first() -> None:
     script = f"""
 import importlib, sys
 for name in {names!r}:
-    for own in [own for own in sys.modules if own.split(".")[0] in ("socialai_dsl", "trainer")]:
+    for own in [own for own in sys.modules if own.split(".")[0] == "socialai_dsl"]:
         del sys.modules[own]
     try:
         importlib.import_module(name)
     except ModuleNotFoundError as error:
-        if error.name.split(".")[0] in ("socialai_dsl", "trainer"):
+        if error.name.split(".")[0] == "socialai_dsl":
             raise  # others are libraries of an extra that is not installed
 """
     subprocess.run([sys.executable, "-c", script], check=True, cwd=ROOT, timeout=900)

@@ -9,14 +9,14 @@ import pytest
 import socialai_dsl
 from socialai_dsl import evaluate
 from socialai_dsl.episodes.players import Player
-from trainer.config import RunConfig
-from trainer.training import train
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.training import train
 
 PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
 
 
 LOSS = """
-from trainer.auxiliary import AuxiliaryLoss
+from socialai_dsl.trainer.auxiliary import AuxiliaryLoss
 class Loss(AuxiliaryLoss):
     def forward(self, frames, outputs, net):
         return outputs.memory.square().mean()

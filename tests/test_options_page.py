@@ -1,4 +1,4 @@
-"""docs/agents.md has the tables of all options of a run and of the recipe, as `trainer.config` declares them."""
+"""docs/agents.md has the tables of all options of a run and of the recipe, as `trainer/config.py` declares them."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from trainer.config import FLAGS, HYPER, RECIPES, RunConfig
+from socialai_dsl.trainer.config import FLAGS, HYPER, RECIPES, RunConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "agents.md"
 

@@ -75,15 +75,19 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
     weights = list((ROOT / "agents").rglob("*.safetensors"))
     assert weights
     for path in weights:
-        assert f"trainer/agents/{path.relative_to(ROOT / 'agents')}" in names
+        assert f"socialai_dsl/trainer/agents/{path.relative_to(ROOT / 'agents')}" in names
     for path in (ROOT / "docs" / "diagnostics").glob("*.md"):
         assert f"socialai_dsl/pages/{path.name}" in names
     for path in (ROOT / "docs" / "cookbook").rglob("*.yaml"):
         assert f"socialai_dsl/cookbook/{path.relative_to(ROOT / 'docs' / 'cookbook')}" in names
-    for package in ("socialai_dsl", "trainer"):
-        for path in (ROOT / package).rglob("*"):
+    for folder, place in (("socialai_dsl", Path()), ("trainer", Path("socialai_dsl"))):
+        for path in (ROOT / folder).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts:
-                assert str(path.relative_to(ROOT)) in names
+                assert str(place / path.relative_to(ROOT)) in names
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"socialai_dsl"}, (
+        "no other name is taken"
+    )
     assert not [name for name in names if name.startswith(("tests/", "runs/", "benchmarks/"))]
 
 

@@ -12,10 +12,10 @@ from safetensors import safe_open
 
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.errors import UsageError
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.shipped import WEIGHTS
 from tools import ship_agent
 from tools.ship_agent import INDEX, Refused, chance_of_difference, compare, halved, ship
-from trainer.checkpoint import read
-from trainer.shipped import WEIGHTS
 
 COMMIT = "0123456789" * 4
 

@@ -16,10 +16,10 @@ from socialai_dsl.episodes import players
 from socialai_dsl.evaluation import evaluate_policy
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.shipped import IDS
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agents_folder, located, shipped_agents
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
-from trainer import checkpoint as checkpoints
-from trainer.play import CheckpointPolicy
-from trainer.shipped import PREFIX, WEIGHTS, agents_folder, located, shipped_agents
 
 Capture = pytest.CaptureFixture[str]
 

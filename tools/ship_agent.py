@@ -47,9 +47,9 @@ from socialai_dsl.runs.copies import MovedScenario
 from socialai_dsl.runs.evaluate import evaluate
 from socialai_dsl.runs.export import finished_agent, write_agent
 from socialai_dsl.runs.folder import CONFIG, RESULT
-from trainer import checkpoint as checkpoints
-from trainer.checkpoint import Checkpoint
-from trainer.shipped import PREFIX, WEIGHTS, agents_folder
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.checkpoint import Checkpoint
+from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agents_folder
 
 EPISODES = 500
 ROUNDING = 0.01

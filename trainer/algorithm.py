@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from socialai_dsl.episodes.policies import Policy
-from trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets import ActorCritic
 
 
 class Algorithm(Protocol):
@@ -21,10 +21,10 @@ class Algorithm(Protocol):
     """
 
     def collect(self) -> Any:
-        """Play `horizon` steps in every environment, as `trainer.rollout.collect` does.
+        """Play `horizon` steps in every environment, as `socialai_dsl.trainer.rollout.collect` does.
 
         Returns:
-            What `update` is given; its attribute `tally`, a `trainer.logging.Tally`, counts the episodes.
+            What `update` is given; its attribute `tally`, a `socialai_dsl.trainer.logging.Tally`, counts the episodes.
         """
 
     def update(self, played: Any) -> Mapping[str, float | None]:

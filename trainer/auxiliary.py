@@ -7,10 +7,10 @@ from abc import ABC, abstractmethod
 import torch
 from torch import Tensor, nn
 
-from trainer.config import RunConfig
-from trainer.extensions import load_class
-from trainer.frames import Environments, Outputs
-from trainer.nets import ActorCritic
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.extensions import load_class
+from socialai_dsl.trainer.frames import Environments, Outputs
+from socialai_dsl.trainer.nets import ActorCritic
 
 SHIPPED = ("none",)
 
@@ -73,7 +73,8 @@ def build_auxiliary(config: RunConfig, net: ActorCritic) -> AuxiliaryLoss | None
         return None
     found = load_class(config.aux, "aux", SHIPPED, AuxiliaryLoss, config.code_folder)
     if not issubclass(found, AuxiliaryLoss):
-        raise ValueError(f"aux: got {config.aux!r}, expected a subclass of trainer.auxiliary.AuxiliaryLoss")
+        expected = "expected a subclass of socialai_dsl.trainer.auxiliary.AuxiliaryLoss"
+        raise ValueError(f"aux: got {config.aux!r}, {expected}")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         made: AuxiliaryLoss = found(config, net).to(config.device)

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.trainer.config import BONUS_SCALES, RunConfig
+from socialai_dsl.trainer.extensions import load_class
+from socialai_dsl.trainer.features import Int64
 from socialai_dsl.vocabulary import words
-from trainer.config import BONUS_SCALES, RunConfig
-from trainer.extensions import load_class
-from trainer.features import Int64
 
 SHIPPED = ("none", *BONUS_SCALES)
 

@@ -17,11 +17,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError
 from torch import Tensor
 
-from trainer.config import RunConfig
-from trainer.errors import CheckpointError
-from trainer.files import CHECKPOINTS, SUFFIX, checkpoint_files
-from trainer.nets import ActorCritic, NetSpec, build_net
-from trainer.shipped import located
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.errors import CheckpointError
+from socialai_dsl.trainer.files import CHECKPOINTS, SUFFIX, checkpoint_files
+from socialai_dsl.trainer.nets import ActorCritic, NetSpec, build_net
+from socialai_dsl.trainer.shipped import located
 
 FORMAT = 2
 _HEADER_LIMIT = 1_000_000

@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.frames import Batch, Frames, Outputs
-from trainer.nets import ActorCritic
-from trainer.nets.dialogue import PrefixTree, prefix_tree
-from trainer.nets.memory import emptied
-from trainer.rollout import Rollout
-from trainer.session import Session
+from socialai_dsl.trainer.frames import Batch, Frames, Outputs
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets.dialogue import PrefixTree, prefix_tree
+from socialai_dsl.trainer.nets.memory import emptied
+from socialai_dsl.trainer.rollout import Rollout
+from socialai_dsl.trainer.session import Session
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.config import code_file
+from socialai_dsl.trainer.config import code_file
 
 
 def load_class(name: str, option: str, shipped: Sequence[str], needed: type, folder: Path) -> Any:

@@ -15,11 +15,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from trainer.errors import ObservationError
-from trainer.extensions import require_shape
-from trainer.nets import ActorCritic
-from trainer.nets.dialogue import prefix_tree
-from trainer.nets.sight import require_bounds
+from socialai_dsl.trainer.errors import ObservationError
+from socialai_dsl.trainer.extensions import require_shape
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets.dialogue import prefix_tree
+from socialai_dsl.trainer.nets.sight import require_bounds
 
 Int64 = NDArray[np.int64]
 

@@ -11,10 +11,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from trainer.features import Int64, content_ids
-from trainer.guides import Lead
-from trainer.nets import ActorCritic
-from trainer.nets.dialogue import PrefixTree, prefix_tree
+from socialai_dsl.trainer.features import Int64, content_ids
+from socialai_dsl.trainer.guides import Lead
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets.dialogue import PrefixTree, prefix_tree
 
 
 class Batch(NamedTuple):

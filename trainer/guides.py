@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.config import RunConfig
-from trainer.extensions import load_class
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.extensions import load_class
 
 SHIPPED = ("none", "script")
 

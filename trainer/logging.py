@@ -16,9 +16,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from trainer.config import RunConfig
-from trainer.files import METRICS, STARTS
-from trainer.session import Session, State
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.files import METRICS, STARTS
+from socialai_dsl.trainer.session import Session, State
 
 
 @dataclass

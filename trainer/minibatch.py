@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.frames import Batch, Environments, Stretches
-from trainer.rollout import Rollout
-from trainer.session import Session
+from socialai_dsl.trainer.frames import Batch, Environments, Stretches
+from socialai_dsl.trainer.rollout import Rollout
+from socialai_dsl.trainer.session import Session
 
 
 def environments(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Environments]]:

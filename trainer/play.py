@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from socialai_dsl.envs.factory import make
 from socialai_dsl.episodes.policies import Observation, Policy
-from trainer import checkpoint as checkpoints
-from trainer.checkpoint import CheckpointMeta
-from trainer.config import scenario_in
-from trainer.errors import CheckpointError
-from trainer.features import Int64
-from trainer.nets import NetSpec
-from trainer.shipped import located
-from trainer.training import restore_algorithm
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.checkpoint import CheckpointMeta
+from socialai_dsl.trainer.config import scenario_in
+from socialai_dsl.trainer.errors import CheckpointError
+from socialai_dsl.trainer.features import Int64
+from socialai_dsl.trainer.nets import NetSpec
+from socialai_dsl.trainer.shipped import located
+from socialai_dsl.trainer.training import restore_algorithm
 
 _WORDS_SHOWN = 6
 
@@ -28,7 +28,7 @@ class CheckpointPolicy:
     """A trained agent, which plays as its algorithm plays with a network; `load` makes one.
 
     That of PPO samples its actions, as in the paper, or takes the most probable ones if `greedy`; see
-    `trainer.policy.NetPolicy`.
+    `socialai_dsl.trainer.policy.NetPolicy`.
 
     Attributes:
         policy: what plays.

@@ -10,10 +10,10 @@ import torch
 from numpy.typing import NDArray
 
 from socialai_dsl.episodes.policies import Observation, Streams
-from trainer import actions as heads
-from trainer.features import Actor, Int64
-from trainer.nets import ActorCritic
-from trainer.nets.memory import emptied
+from socialai_dsl.trainer import actions as heads
+from socialai_dsl.trainer.features import Actor, Int64
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets.memory import emptied
 
 # Encodings kept before they are made anew, so that endless play does not fill the memory.
 _REMEMBERED_FRAMES = 1 << 16

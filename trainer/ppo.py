@@ -13,17 +13,17 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from trainer import actions as heads
-from trainer.auxiliary import loss_of
-from trainer.chunks import Chunks, chunks
-from trainer.config import RunConfig
-from trainer.errors import require_finite
-from trainer.frames import Batch, Environments
-from trainer.minibatch import cut_out, environments
-from trainer.nets import ActorCritic
-from trainer.policy import NetPolicy
-from trainer.rollout import Rollout, collect
-from trainer.session import Mapper, Session
+from socialai_dsl.trainer import actions as heads
+from socialai_dsl.trainer.auxiliary import loss_of
+from socialai_dsl.trainer.chunks import Chunks, chunks
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.errors import require_finite
+from socialai_dsl.trainer.frames import Batch, Environments
+from socialai_dsl.trainer.minibatch import cut_out, environments
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.policy import NetPolicy
+from socialai_dsl.trainer.rollout import Rollout, collect
+from socialai_dsl.trainer.session import Mapper, Session
 
 # -- advantages ---------------------------------------------------------------------------------------------------
 

@@ -10,15 +10,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from trainer import actions as heads
-from trainer.bonus import BatchStep
-from trainer.errors import require_finite
-from trainer.extensions import require_array, require_shape
-from trainer.features import Actor, Int64, content_ids
-from trainer.guides import Guide, Lead
-from trainer.logging import Tally
-from trainer.nets.memory import emptied
-from trainer.session import Session
+from socialai_dsl.trainer import actions as heads
+from socialai_dsl.trainer.bonus import BatchStep
+from socialai_dsl.trainer.errors import require_finite
+from socialai_dsl.trainer.extensions import require_array, require_shape
+from socialai_dsl.trainer.features import Actor, Int64, content_ids
+from socialai_dsl.trainer.guides import Guide, Lead
+from socialai_dsl.trainer.logging import Tally
+from socialai_dsl.trainer.nets.memory import emptied
+from socialai_dsl.trainer.session import Session
 
 
 class Rollout(NamedTuple):

@@ -16,18 +16,18 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from trainer import checkpoint as checkpoints
-from trainer.algorithm import Algorithm
-from trainer.auxiliary import AuxiliaryLoss, build_auxiliary
-from trainer.bonus import Bonus, build_bonus
-from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
-from trainer.config import RunConfig
-from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
-from trainer.errors import CheckpointError, ObservationError, TrainingStopped
-from trainer.features import Actor, Int64
-from trainer.files import CHECKPOINTS, checkpoint_files
-from trainer.guides import Guide, build_guide
-from trainer.nets import NetSpec, build_net
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.algorithm import Algorithm
+from socialai_dsl.trainer.auxiliary import AuxiliaryLoss, build_auxiliary
+from socialai_dsl.trainer.bonus import Bonus, build_bonus
+from socialai_dsl.trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
+from socialai_dsl.trainer.errors import CheckpointError, ObservationError, TrainingStopped
+from socialai_dsl.trainer.features import Actor, Int64
+from socialai_dsl.trainer.files import CHECKPOINTS, checkpoint_files
+from socialai_dsl.trainer.guides import Guide, build_guide
+from socialai_dsl.trainer.nets import NetSpec, build_net
 
 Mapper = Callable[..., Iterable[Any]]
 """`map`, or that of a pool of threads."""

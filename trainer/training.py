@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from trainer.algorithm import Algorithm
-from trainer.checkpoint import Checkpoint
-from trainer.config import RunConfig
-from trainer.errors import CheckpointError, require_finite
-from trainer.extensions import load_class
-from trainer.files import CHECKPOINTS, checkpoint_files
-from trainer.logging import Metrics, MetricsLog, Tally, Tracker
-from trainer.ppo import Ppo
-from trainer.session import Session, explained_stops, threads_of
+from socialai_dsl.trainer.algorithm import Algorithm
+from socialai_dsl.trainer.checkpoint import Checkpoint
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.errors import CheckpointError, require_finite
+from socialai_dsl.trainer.extensions import load_class
+from socialai_dsl.trainer.files import CHECKPOINTS, checkpoint_files
+from socialai_dsl.trainer.logging import Metrics, MetricsLog, Tally, Tracker
+from socialai_dsl.trainer.ppo import Ppo
+from socialai_dsl.trainer.session import Session, explained_stops, threads_of
 
 SHIPPED: Mapping[str, type[Algorithm]] = {"ppo": Ppo}
 """The algorithms that need no module."""
@@ -130,7 +130,7 @@ def _tally(played: Any) -> Tally:
     if not isinstance(tally, Tally):
         raise ValueError(
             f"algorithm: collect returned {type(played).__name__}, expected an object whose `tally` is a "
-            "trainer.logging.Tally"
+            "socialai_dsl.trainer.logging.Tally"
         )
     return tally
 

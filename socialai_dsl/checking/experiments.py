@@ -18,8 +18,8 @@ from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
 from socialai_dsl.source import DataPath
-from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, RunConfig
-from trainer.shipped import PREFIX, shipped_agents
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX, RunConfig
+from socialai_dsl.trainer.shipped import PREFIX, shipped_agents
 
 
 @dataclass(frozen=True)

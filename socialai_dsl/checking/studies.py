@@ -17,7 +17,7 @@ from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.study import PERSON, WHO, Block, Question, Study
 from socialai_dsl.semantics.study import Design, design_of
 from socialai_dsl.source import DataPath
-from trainer.shipped import PREFIX, shipped_agents
+from socialai_dsl.trainer.shipped import PREFIX, shipped_agents
 
 AGENT: Final = "agent"
 PRACTICE: Final = -1

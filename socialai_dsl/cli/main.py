@@ -19,7 +19,7 @@ from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, is_usage, printable, render_text, suggested
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.errors import OptionError, RunFailed, UsageError, described_error
-from trainer.config import HYPER
+from socialai_dsl.trainer.config import HYPER
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""

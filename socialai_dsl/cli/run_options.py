@@ -10,7 +10,7 @@ from socialai_dsl.cli.arguments import add_declared, add_seats, flag, typed_opti
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.options import AUTOMATIC
-from trainer.config import FLAGS, HYPER, RECIPES, RunConfig
+from socialai_dsl.trainer.config import FLAGS, HYPER, RECIPES, RunConfig
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -2,7 +2,7 @@
 
 * `play(rooms, players, agenda)`: the loop; `play_async` for policies that answer later.
 * `Policy`: what plays a seat. `RandomPolicy`, `ScriptedPolicy`, `FunctionPolicy`, `PredictingPolicy` (models of
-  Stable-Baselines3), `ReplayedPolicy` and `trainer.play.CheckpointPolicy` are some.
+  Stable-Baselines3), `ReplayedPolicy` and `socialai_dsl.trainer.play.CheckpointPolicy` are some.
 * `Observer`: what watches rooms. `Results` counts, `Actions` keeps what was done, `Tracing` traces, and so does a film.
 * `Stage`: one room, played step by step with steps back, as the terminal and the studio do.
 """

@@ -28,8 +28,8 @@ from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.folder import CONFIG, agent_of
-from trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
-from trainer.shipped import PREFIX, located, shipped_agents
+from socialai_dsl.trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
+from socialai_dsl.trainer.shipped import PREFIX, located, shipped_agents
 
 SHIPPED: Final = "shipped"
 """The agent that ships for the scenario that is played."""
@@ -183,7 +183,7 @@ def make_policy(player: Player, envs: Any) -> tuple[Policy, list[str]]:
         return StillPolicy(Rooms(envs).action_sizes), []
     if player.follows_frame:
         return ScriptedPolicy(envs), []
-    from trainer.play import CheckpointPolicy
+    from socialai_dsl.trainer.play import CheckpointPolicy
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -22,8 +22,8 @@ from socialai_dsl.episodes.scripts import with_frame_of
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.evaluation.test_set import play_test_set
 from socialai_dsl.program_suite import seats_of
-from trainer.config import MODEL_PREFIX, RIVAL_PREFIX
-from trainer.shipped import PREFIX
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX
+from socialai_dsl.trainer.shipped import PREFIX
 
 
 @dataclass(frozen=True, eq=False)

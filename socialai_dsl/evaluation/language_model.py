@@ -34,7 +34,7 @@ from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces.endings import Ending
 from socialai_dsl.traces.tracing import Answers
-from trainer.config import MODEL_PREFIX
+from socialai_dsl.trainer.config import MODEL_PREFIX
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
     from socialai_dsl.llm.endpoint import Endpoint

@@ -105,8 +105,8 @@ def _sat(player: Player, name: str, folder: Path) -> bool:
 
 def _is_copy_of(file: Path, agent: str) -> bool:
     """Whether a file that the folder of an evaluation keeps holds the network of an agent."""
-    from trainer.checkpoint import read_agent
-    from trainer.errors import CheckpointError
+    from socialai_dsl.trainer.checkpoint import read_agent
+    from socialai_dsl.trainer.errors import CheckpointError
 
     if not file.is_file():
         return False

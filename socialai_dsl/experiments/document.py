@@ -15,9 +15,9 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.runs.options import resolved_config, usual_options
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
-from trainer.config import BONUS_SCALES, MODEL_PREFIX, RIVAL_PREFIX, WITHOUT_EFFECT, RunConfig
-from trainer.files import CHECKPOINTS, checkpoint_files
-from trainer.shipped import PREFIX, located
+from socialai_dsl.trainer.config import BONUS_SCALES, MODEL_PREFIX, RIVAL_PREFIX, WITHOUT_EFFECT, RunConfig
+from socialai_dsl.trainer.files import CHECKPOINTS, checkpoint_files
+from socialai_dsl.trainer.shipped import PREFIX, located
 
 FORMAT: Final = 1
 

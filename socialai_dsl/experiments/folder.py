@@ -13,7 +13,7 @@ from socialai_dsl.atomic import read_json
 from socialai_dsl.errors import UnreadableError, first_mistake
 from socialai_dsl.experiments.record import ExperimentRecord
 from socialai_dsl.runs.folder import Run
-from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
 
 EXPERIMENT: Final = "experiment.json"
 RUNS: Final = "runs"

@@ -29,8 +29,8 @@ from socialai_dsl.runs.folder import (
 )
 from socialai_dsl.runs.lock import HeldError
 from socialai_dsl.runs.status import State, Status
-from trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
-from trainer.files import checkpoint_files
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
+from socialai_dsl.trainer.files import checkpoint_files
 
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""

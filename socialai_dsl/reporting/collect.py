@@ -49,7 +49,7 @@ from socialai_dsl.runs.folder import (
     WORDS,
     Run,
 )
-from trainer.config import HYPER, PARTNERS_FOLDER, RunConfig, configure, scenario_in
+from socialai_dsl.trainer.config import HYPER, PARTNERS_FOLDER, RunConfig, configure, scenario_in
 
 Content = TypeVar("Content")
 

@@ -17,9 +17,9 @@ from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
 from socialai_dsl.loader.resolved import name_source, parse_name
 from socialai_dsl.runs.folder import SCENARIO
-from trainer.config import MODEL_PREFIX, PARTNERS_FOLDER, RIVAL_PREFIX, RunConfig, scenario_in
-from trainer.files import CHECKPOINTS, SUFFIX
-from trainer.shipped import PREFIX
+from socialai_dsl.trainer.config import MODEL_PREFIX, PARTNERS_FOLDER, RIVAL_PREFIX, RunConfig, scenario_in
+from socialai_dsl.trainer.files import CHECKPOINTS, SUFFIX
+from socialai_dsl.trainer.shipped import PREFIX
 
 
 def keep_scenario(folder: Path, spec: str, loaded: Loaded) -> "MovedScenario":
@@ -96,8 +96,8 @@ def keep_partners(folder: Path, seats: Mapping[str, Sequence[str]]) -> dict[str,
     def kept(seat: str, place: int, name: str) -> str:
         if name in (SCRIPT, RANDOM, NOBODY) or name.startswith((PREFIX, MODEL_PREFIX, RIVAL_PREFIX)):
             return name
-        from trainer import checkpoint as checkpoints
-        from trainer.errors import CheckpointError
+        from socialai_dsl.trainer import checkpoint as checkpoints
+        from socialai_dsl.trainer.errors import CheckpointError
 
         try:
             network = checkpoints.read_agent(name).network

@@ -15,7 +15,7 @@ from socialai_dsl.frontend import load
 from socialai_dsl.runs.evaluate import made_player
 from socialai_dsl.runs.folder import CROSSPLAY, new_folders
 from socialai_dsl.runs.report import require_libraries
-from trainer.config import MODEL_PREFIX
+from socialai_dsl.trainer.config import MODEL_PREFIX
 
 PICTURE: Final = "crossplay"
 """The name of the picture, without its endings."""

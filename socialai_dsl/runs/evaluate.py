@@ -47,7 +47,7 @@ from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
 from socialai_dsl.traces.endings import short_name
-from trainer.config import MODEL_PREFIX, RunConfig
+from socialai_dsl.trainer.config import MODEL_PREFIX, RunConfig
 
 _PLAYER: Final = ("greedy", "seed", "device", "net", "algorithm")
 _MODEL: Final = tuple(field.name for field in fields(ModelOptions))

@@ -23,11 +23,11 @@ from socialai_dsl.runs.folder import (
     scenario_folder_name,
 )
 from socialai_dsl.runs.model_card import model_card
-from trainer.config import RunConfig
-from trainer.shipped import WEIGHTS
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.shipped import WEIGHTS
 
 if TYPE_CHECKING:
-    from trainer.checkpoint import Checkpoint
+    from socialai_dsl.trainer.checkpoint import Checkpoint
 
 CARD: Final = "README.md"
 VOCABULARY: Final = "vocabulary.json"
@@ -73,8 +73,8 @@ def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
     Raises:
         UsageError: it is not such a folder, it is not finished, or its agent was not trained.
     """
-    from trainer import checkpoint as checkpoints
-    from trainer.errors import CheckpointError
+    from socialai_dsl.trainer import checkpoint as checkpoints
+    from socialai_dsl.trainer.errors import CheckpointError
 
     config = read_config(run)
     if not config.trains:
@@ -106,7 +106,7 @@ def write_agent(
         result: content of the run's `result.json`.
         agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
     """
-    from trainer import checkpoint as checkpoints
+    from socialai_dsl.trainer import checkpoint as checkpoints
 
     moved = MovedScenario.of(loaded, config.played)
     moved.copy(out)

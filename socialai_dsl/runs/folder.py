@@ -19,9 +19,9 @@ from socialai_dsl.atomic import read_json
 from socialai_dsl.errors import OptionError, UnreadableError, UsageError, described_error, first_mistake
 from socialai_dsl.runs.lock import HeldError, Holder, hold, holder
 from socialai_dsl.runs.status import Status
-from trainer.config import LEARNS, RunConfig, scenario_file, scenario_in
-from trainer.config import SCENARIO_FOLDER as SCENARIO
-from trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
+from socialai_dsl.trainer.config import LEARNS, RunConfig, scenario_file, scenario_in
+from socialai_dsl.trainer.config import SCENARIO_FOLDER as SCENARIO
+from socialai_dsl.trainer.files import CHECKPOINTS, METRICS, STARTS, checkpoint_files
 
 # What training writes, and the copy of the scenario, are named where the trainer finds them.
 __all__ = ["CHECKPOINTS", "METRICS", "SCENARIO", "STARTS"]

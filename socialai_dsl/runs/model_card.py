@@ -8,8 +8,8 @@ import yaml
 
 from socialai_dsl.evaluation.summary import ending_rows, summary_rows
 from socialai_dsl.runs.folder import scenario_folder_name
-from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
-from trainer.shipped import PREFIX
+from socialai_dsl.trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
+from socialai_dsl.trainer.shipped import PREFIX
 
 # Options that change where and how a run is made, not what it learns.
 _NOT_REPEATED: Final = ("agent", "device", "eval_episodes", "wandb", "checkpoint_every", "keep_checkpoints")
@@ -183,7 +183,7 @@ def _snippet(config: RunConfig, agent: str) -> str:
     code += f", folder=Path({_quoted(config.code_folder.as_posix())})" if own else ""
     return f"""\
 {"from pathlib import Path" + chr(10) * 2 if own else ""}import socialai_dsl as sd
-from trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.play import CheckpointPolicy
 
 env = sd.make({_quoted(config.scenario)})
 agent = CheckpointPolicy.load({_quoted(agent)}, env{code})

@@ -15,7 +15,16 @@ from socialai_dsl.checking.loaded import Loaded, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.errors import OptionError, first_mistake
 from socialai_dsl.frontend import closest_script, load_curriculum
-from trainer.config import BONUS_SCALES, FLAGS, HYPER, NET_PRESETS, RECIPES, UNTRAINED, RunConfig, configure
+from socialai_dsl.trainer.config import (
+    BONUS_SCALES,
+    FLAGS,
+    HYPER,
+    NET_PRESETS,
+    RECIPES,
+    UNTRAINED,
+    RunConfig,
+    configure,
+)
 
 AUTOMATIC: Final[Mapping[str, str]] = {
     "device": "a graphics card where there is one",

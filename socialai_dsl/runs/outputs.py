@@ -21,7 +21,7 @@ from socialai_dsl.runs.folder import (
 from socialai_dsl.runs.model_card import model_card
 from socialai_dsl.runs.recordings import episodes_table
 from socialai_dsl.traces.page import replay_page
-from trainer.config import RunConfig
+from socialai_dsl.trainer.config import RunConfig
 
 _REPLAYED: Final = 5
 """The number of failures, and of successes, that the page of a run replays."""

@@ -45,8 +45,8 @@ from socialai_dsl.runs.options import continued_config, new_config
 from socialai_dsl.runs.outputs import draw_curve, record_run, training_figures, write_card
 from socialai_dsl.runs.stopping import Stop
 from socialai_dsl.traces.endings import endings_of, short_name
-from trainer.config import LEARNS, RunConfig
-from trainer.files import checkpoint_files
+from socialai_dsl.trainer.config import LEARNS, RunConfig
+from socialai_dsl.trainer.files import checkpoint_files
 
 if TYPE_CHECKING:
     from socialai_dsl.runs.tracking import WandbTracker
@@ -127,8 +127,9 @@ def train(
         scenario: a path or a name, with `+variants` and `?parameters`.
         out: the folder of the run, which holds none yet (default: `runs/<scenario>/<time>-s<seed>`).
         progress: called before training and after each update; nothing is printed.
-        options: of `trainer.config.RunConfig`, such as `frames=100_000`, `seed=1`, `net="paper"` or `lr=1e-4`; those
-            that are left out, `frames`, `recipe`, `device` and `threads` among them, follow from scenario and machine.
+        options: of `socialai_dsl.trainer.config.RunConfig`, such as `frames=100_000`, `seed=1`, `net="paper"` or
+            `lr=1e-4`; those that are left out, `frames`, `recipe`, `device` and `threads` among
+            them, follow from scenario and machine.
             `seats={"helper": ["script", "runs/x"]}` names players that take turns on a seat from game to game; they
             stay as they are, and the agent learns on the seats that are left.
             With `agent="random"`, `"oracle"` or the path of a trained agent nothing is trained: that agent is tested.
@@ -285,8 +286,8 @@ def _train(
         RunFailed: training broke down.
         KeyboardInterrupt: with a message that says how to go on.
     """
-    from trainer.errors import TrainingStopped
-    from trainer.training import train
+    from socialai_dsl.trainer.errors import TrainingStopped
+    from socialai_dsl.trainer.training import train
 
     played = _played(config, loaded)
     scenario = program if played is loaded else compiled(played)

@@ -20,7 +20,7 @@ from socialai_dsl.model_options import ModelOptions, meanings
 from socialai_dsl.schema.holds import Holds, branches
 from socialai_dsl.schema.scenario import ListOf, Model, Prose, Word, _one_or_many, as_written
 from socialai_dsl.schema.suite import MemberName
-from trainer.config import BONUS_SCALES, FLAGS, HYPER, MOST_FRAMES, RunConfig
+from socialai_dsl.trainer.config import BONUS_SCALES, FLAGS, HYPER, MOST_FRAMES, RunConfig
 
 Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""

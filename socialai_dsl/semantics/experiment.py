@@ -25,7 +25,7 @@ from socialai_dsl.schema.experiment import (
     one_setting,
 )
 from socialai_dsl.source import DataPath, Node
-from trainer.config import MODEL_PREFIX, RIVAL_PREFIX
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX
 
 MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""

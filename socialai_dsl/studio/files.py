@@ -20,7 +20,7 @@ from socialai_dsl.loader.reader import FORBIDDEN, MAX_FILE_BYTES, SUFFIXES, read
 from socialai_dsl.loader.resolved import taken_apart
 from socialai_dsl.runs.folder import CONFIG
 from socialai_dsl.studio.drafts import Draft, Drafts, new_window
-from trainer.shipped import PREFIX, located, shipped_agents
+from socialai_dsl.trainer.shipped import PREFIX, located, shipped_agents
 
 PLAYERS: Final = ("me", "script", "random")
 _MOST_FILES: Final = 500

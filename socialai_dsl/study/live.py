@@ -21,7 +21,7 @@ from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, FORMAT, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
-from trainer.shipped import PREFIX
+from socialai_dsl.trainer.shipped import PREFIX
 
 Row = dict[str, Any]
 

@@ -13,7 +13,7 @@ from benchmarks import training_speed
 from benchmarks.__main__ import main
 from benchmarks.training_entries import Entry, entries, own_updates
 from benchmarks.training_report import training_table
-from trainer.config import configure
+from socialai_dsl.trainer.config import configure
 
 Capture = pytest.CaptureFixture[str]
 

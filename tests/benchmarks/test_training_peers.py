@@ -15,9 +15,9 @@ from torch import Tensor, nn
 from benchmarks.training import LongDialogue, clean_loop, plain_loop
 from benchmarks.training.networks import SIZE, Agent, CellTrunk, PaperTrunk
 from benchmarks.training.settings import Settings, advantages, observe, padded
-from trainer.nets import ActorCritic, NetSpec, build_net
-from trainer.nets.dialogue import prefix_tree
-from trainer.ppo import compute_gae
+from socialai_dsl.trainer.nets import ActorCritic, NetSpec, build_net
+from socialai_dsl.trainer.nets.dialogue import prefix_tree
+from socialai_dsl.trainer.ppo import compute_gae
 
 SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
 NEEDS_SB3 = pytest.mark.skipif(find_spec("sb3_contrib") is None, reason="sb3-contrib is not installed")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from socialai_dsl.loader.reader import shipped_folder
-from trainer.shipped import agents_folder
+from socialai_dsl.trainer.shipped import agents_folder
 
 ROOT = Path(__file__).parents[2]
 DIAGNOSTICS = ROOT / "tests" / "diagnostics"

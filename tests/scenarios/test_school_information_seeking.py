@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.trainer.curricula import Leaves, build_curriculum
 from tests.quick import one_in
 from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
-from trainer.curricula import Leaves, build_curriculum
 
 PROBLEMS = ("boxes", "switches", "generators", "marbles", "doors", "levers")
 CUES = ("color", "feedback", "pointing", "emulation", "scaffolding")

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import torch
 
-from trainer.config import RunConfig
+from socialai_dsl.trainer.config import RunConfig
 
 
 @pytest.fixture(autouse=True)

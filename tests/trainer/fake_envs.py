@@ -7,7 +7,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from trainer.features import content_ids
+from socialai_dsl.trainer.features import content_ids
 
 _SAME, _DISABLED = gym.vector.AutoresetMode.SAME_STEP, gym.vector.AutoresetMode.DISABLED
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)

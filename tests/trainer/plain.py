@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.nets.dialogue import DialogueEncoder, GruEncoder, HeardWords
-from trainer.nets.lines import HeardOrder, Together
+from socialai_dsl.trainer.nets.dialogue import DialogueEncoder, GruEncoder, HeardWords
+from socialai_dsl.trainer.nets.lines import HeardOrder, Together
 
 
 def encode(dialogue: DialogueEncoder, tokens: np.ndarray) -> Tensor:

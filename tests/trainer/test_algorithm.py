@@ -8,21 +8,21 @@ import pytest
 import torch
 
 from socialai_dsl.cli.main import run_main
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.errors import CheckpointError, TrainingStopped
+from socialai_dsl.trainer.logging import Tally
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.policy import NetPolicy
+from socialai_dsl.trainer.ppo import Ppo
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.training import SHIPPED, algorithm_class, begin, train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.checkpoint import read
-from trainer.errors import CheckpointError, TrainingStopped
-from trainer.logging import Tally
-from trainer.play import CheckpointPolicy
-from trainer.policy import NetPolicy
-from trainer.ppo import Ppo
-from trainer.rollout import collect
-from trainer.session import Session
-from trainer.training import SHIPPED, algorithm_class, begin, train
 
 MINE = """
 import torch
-from trainer.policy import NetPolicy
-from trainer.rollout import collect
+from socialai_dsl.trainer.policy import NetPolicy
+from socialai_dsl.trainer.rollout import collect
 
 
 class Algorithm:

@@ -8,23 +8,23 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from socialai_dsl.trainer.auxiliary import AuxiliaryLoss, build_auxiliary
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.frames import Environments, Outputs, Stretches
+from socialai_dsl.trainer.minibatch import cut_out
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.ppo import estimate_advantages, update
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.training import train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.auxiliary import AuxiliaryLoss, build_auxiliary
-from trainer.checkpoint import read
-from trainer.config import RunConfig
-from trainer.frames import Environments, Outputs, Stretches
-from trainer.minibatch import cut_out
-from trainer.nets import ActorCritic
-from trainer.ppo import estimate_advantages, update
-from trainer.rollout import collect
-from trainer.session import Session
-from trainer.training import train
 
 MINE = """
 import torch
 from torch import nn
 from torch.nn import functional
-from trainer.auxiliary import AuxiliaryLoss
+from socialai_dsl.trainer.auxiliary import AuxiliaryLoss
 
 
 class Loss(AuxiliaryLoss):
@@ -200,7 +200,7 @@ def test_what_it_must_not_return_is_refused_by_name_and_nothing_is_lost(
 
 def test_a_class_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
-        "from torch import nn\nfrom trainer.auxiliary import AuxiliaryLoss\n"
+        "from torch import nn\nfrom socialai_dsl.trainer.auxiliary import AuxiliaryLoss\n"
         "class Plain:\n    def begin(self): pass\n    def forward(self): pass\n"
         "class Lacking(AuxiliaryLoss): pass\n"
         "class Keeping(AuxiliaryLoss):\n    def __init__(self, config, net):\n        super().__init__(config, net)\n"
@@ -213,7 +213,10 @@ def test_a_class_of_another_kind_is_refused(tmp_path: Path) -> None:
     net: Any = Net()
     net.weight = nn.Parameter(torch.zeros(1))
     for name, message in (
-        ("Plain", "aux: got 'mine:Plain', expected a subclass of trainer.auxiliary.AuxiliaryLoss"),
+        (
+            "Plain",
+            "aux: got 'mine:Plain', expected a subclass of socialai_dsl.trainer.auxiliary.AuxiliaryLoss",
+        ),
         ("Lacking", "Lacking lacks the method 'forward'"),
         ("Keeping", "aux: mine:Keeping keeps a part of the network"),
     ):

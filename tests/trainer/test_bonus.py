@@ -10,8 +10,8 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.envs.table import HeardLines
-from trainer.bonus import BatchStep, EpisodicBonus, LineBonus, cell_codes
-from trainer.config import RunConfig
+from socialai_dsl.trainer.bonus import BatchStep, EpisodicBonus, LineBonus, cell_codes
+from socialai_dsl.trainer.config import RunConfig
 
 IMAGE = np.zeros((2, 7, 7, 4), np.uint8)
 

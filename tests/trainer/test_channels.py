@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
-from trainer.checkpoint import read, restore_net
-from trainer.config import RunConfig
-from trainer.errors import CheckpointError
-from trainer.nets import NetSpec
-from trainer.training import train
+from socialai_dsl.trainer.checkpoint import read, restore_net
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.errors import CheckpointError
+from socialai_dsl.trainer.nets import NetSpec
+from socialai_dsl.trainer.training import train
 
 PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
 

@@ -20,15 +20,15 @@ import safetensors.torch
 import torch
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.checkpoint import Checkpoint, read, restore_net, write
+from socialai_dsl.trainer.errors import CheckpointError
+from socialai_dsl.trainer.nets import NetSpec
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.ppo import update
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
 from tests.trainer.fake_envs import EchoEnvs
-from trainer import checkpoint as checkpoints
-from trainer.checkpoint import Checkpoint, read, restore_net, write
-from trainer.errors import CheckpointError
-from trainer.nets import NetSpec
-from trainer.play import CheckpointPolicy
-from trainer.ppo import update
-from trainer.rollout import collect
-from trainer.session import Session
 
 ROOT = Path(__file__).parents[2]
 
@@ -324,9 +324,9 @@ import json, os, random, signal, sys, time, warnings
 sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.checkpoint import Checkpoint, read, write
-from trainer.config import RunConfig
-from trainer.session import Session
+from socialai_dsl.trainer.checkpoint import Checkpoint, read, write
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.session import Session
 
 folder, kills = Path(sys.argv[1]), int(sys.argv[2])
 config = RunConfig(envs=8, horizon=8, minibatches=2, threads=1)

@@ -8,14 +8,14 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from socialai_dsl.trainer.chunks import chunk_starts, chunks
+from socialai_dsl.trainer.config import RunConfig, configure
+from socialai_dsl.trainer.policy import NetPolicy
+from socialai_dsl.trainer.ppo import compute_gae, estimate_advantages, update
+from socialai_dsl.trainer.rollout import Rollout, collect
+from socialai_dsl.trainer.session import Session
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.chunks import chunk_starts, chunks
-from trainer.config import RunConfig, configure
-from trainer.policy import NetPolicy
-from trainer.ppo import compute_gae, estimate_advantages, update
-from trainer.rollout import Rollout, collect
-from trainer.session import Session
 
 
 def small(net: str = "paper-reference", **changes: Any) -> RunConfig:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, SCHEDULED, RunConfig, configure
+from socialai_dsl.trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, SCHEDULED, RunConfig, configure
 
 
 def test_the_defaults_are_the_settings_that_worked() -> None:

@@ -10,14 +10,14 @@ import torch
 import socialai_dsl as sd
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import load_curriculum
-from trainer.checkpoint import read
-from trainer.config import RunConfig
-from trainer.curricula import Leaves, Phases, build_curriculum
-from trainer.curricula.even import EvenFrames
-from trainer.curricula.progress import WINDOW, LearningProgress
-from trainer.errors import CheckpointError
-from trainer.session import Session
-from trainer.training import train
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.curricula import Leaves, Phases, build_curriculum
+from socialai_dsl.trainer.curricula.even import EvenFrames
+from socialai_dsl.trainer.curricula.progress import WINDOW, LearningProgress
+from socialai_dsl.trainer.errors import CheckpointError
+from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.training import train
 
 SCHOOL = str(Path(__file__).parents[1] / "data" / "suites" / "school.yaml")
 INTRODUCTIONS = ("none", "eye_contact", "ask", "ask_eye_contact")

@@ -14,12 +14,12 @@ import torch
 from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.evaluation import evaluate_policy
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.training import train
 from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
-from trainer.checkpoint import read
-from trainer.play import CheckpointPolicy
-from trainer.training import train
 
 
 @pytest.mark.parametrize("net", one_in(3, ["fast", "paper", "paper-reference"], "computes convolutions"))

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from trainer.features import DistinctRows, content_ids
-from trainer.nets.dialogue import PrefixTree, prefix_tree
+from socialai_dsl.trainer.features import DistinctRows, content_ids
+from socialai_dsl.trainer.nets.dialogue import PrefixTree, prefix_tree
 
 HISTORIES = st.lists(st.lists(st.integers(1, 3), max_size=6), min_size=1, max_size=12)
 

@@ -9,10 +9,10 @@ from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.episodes import EvalResult, RandomPolicy, ScriptedPolicy, wilson_interval
 from socialai_dsl.evaluation import evaluate_policy
+from socialai_dsl.trainer.checkpoint import write
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.session import Session
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.checkpoint import write
-from trainer.play import CheckpointPolicy
-from trainer.session import Session
 
 DISABLED = AutoresetMode.DISABLED
 SIZES = (4, 2, 2, 4)

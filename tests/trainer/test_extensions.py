@@ -9,18 +9,18 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
+from socialai_dsl.trainer.bonus import build_bonus
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.curricula import Leaves, build_curriculum
+from socialai_dsl.trainer.errors import TrainingStopped
+from socialai_dsl.trainer.guides import Lead, build_guide
+from socialai_dsl.trainer.nets import NetSpec, build_net
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.training import train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.bonus import build_bonus
-from trainer.checkpoint import read
-from trainer.config import RunConfig
-from trainer.curricula import Leaves, build_curriculum
-from trainer.errors import TrainingStopped
-from trainer.guides import Lead, build_guide
-from trainer.nets import NetSpec, build_net
-from trainer.play import CheckpointPolicy
-from trainer.rollout import collect
-from trainer.session import Session
-from trainer.training import train
 
 SPEC = NetSpec((4, 2, 2, 4), (7, 7, 4), (12, 5, 3, 3), ("<pad>", "<unk>", "hello"))
 LEAVES = Leaves(("a", "b"), ({}, {}), (1, 1))
@@ -28,8 +28,8 @@ LEAVES = Leaves(("a", "b"), ({}, {}), (1, 1))
 MINE = '''
 import numpy as np
 from torch import nn
-from trainer.guides import ScriptGuide
-from trainer.nets import FastNet, Memory
+from socialai_dsl.trainer.guides import ScriptGuide
+from socialai_dsl.trainer.nets import FastNet, Memory
 
 
 class GruMemory(Memory):
@@ -152,7 +152,10 @@ def test_a_mistake_is_one_line(option: str, name: str, text: str, message: str, 
 
 
 def test_a_network_lacks_what_it_does_not_implement(tmp_path: Path) -> None:
-    text = "from trainer.nets import ActorCritic\nclass Mine(ActorCritic):\n    def prepare(self, images): pass\n"
+    text = (
+        "from socialai_dsl.trainer.nets import ActorCritic\n"
+        "class Mine(ActorCritic):\n    def prepare(self, images): pass\n"
+    )
     (tmp_path / "mine.py").write_text(text)
     with pytest.raises(ValueError, match=r"net: .*/mine\.py: Mine lacks the method 'perceive'"):
         build_net("mine:Mine", SPEC, 0, folder=tmp_path)
@@ -160,7 +163,8 @@ def test_a_network_lacks_what_it_does_not_implement(tmp_path: Path) -> None:
         "class Mine:\n    def prepare(self): pass\n    def perceive(self): pass\n"
     )
     with pytest.raises(
-        ValueError, match=r"net: got 'other:Mine', expected a subclass of trainer\.nets\.ActorCritic"
+        ValueError,
+        match=r"net: got 'other:Mine', expected a subclass of socialai_dsl\.trainer\.nets\.ActorCritic",
     ):
         build_net("other:Mine", SPEC, 0, folder=tmp_path)
 
@@ -170,14 +174,14 @@ def test_equally_named_files_of_two_folders_do_not_meet(tmp_path: Path) -> None:
         folder = tmp_path / str(number)
         folder.mkdir()
         (folder / "mine.py").write_text(
-            f"from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {4 * number}\n"
+            f"from socialai_dsl.trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {4 * number}\n"
         )
     sizes = [build_net("mine:Net", SPEC, 0, folder=tmp_path / str(n)).kind_size for n in (1, 2, 1)]
     assert sizes == [4, 8, 4]
 
 
 def test_what_lies_beside_the_file_can_be_imported_and_is_that_of_its_own_folder(tmp_path: Path) -> None:
-    text = "from beside_the_file import SIZE\nfrom trainer.nets import FastNet\n"
+    text = "from beside_the_file import SIZE\nfrom socialai_dsl.trainer.nets import FastNet\n"
     for size in (12, 20):
         folder = tmp_path / str(size)
         folder.mkdir()
@@ -188,7 +192,7 @@ def test_what_lies_beside_the_file_can_be_imported_and_is_that_of_its_own_folder
 
 def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
     for size in (4, 8):
-        text = f"from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {size}\n"
+        text = f"from socialai_dsl.trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {size}\n"
         (tmp_path / "mine.py").write_text(text)
         assert build_net("mine:Net", SPEC, 0, folder=tmp_path).kind_size == size
 

@@ -13,17 +13,17 @@ import torch
 from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.evaluation import evaluate_policy
+from socialai_dsl.trainer.actions import log_probs_and_entropies
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.frames import Batch
+from socialai_dsl.trainer.guides import Lead, ScriptGuide
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.ppo import estimate_advantages, ppo_loss, update
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.training import train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.actions import log_probs_and_entropies
-from trainer.checkpoint import read
-from trainer.config import RunConfig
-from trainer.frames import Batch
-from trainer.guides import Lead, ScriptGuide
-from trainer.play import CheckpointPolicy
-from trainer.ppo import estimate_advantages, ppo_loss, update
-from trainer.rollout import collect
-from trainer.session import Session
-from trainer.training import train
 
 
 def mixed_batch() -> tuple[Batch, torch.Tensor]:
@@ -193,7 +193,7 @@ def test_without_a_lead_nothing_is_different(update: str, tmp_path: Path, small_
 
 NOBODY = """
 import numpy as np
-from trainer.guides import Lead
+from socialai_dsl.trainer.guides import Lead
 
 class Guide:
     def __init__(self, config, envs):

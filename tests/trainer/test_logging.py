@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from trainer.config import RunConfig
-from trainer.logging import MetricsLog, Tally, episode_metrics, record_start
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.logging import MetricsLog, Tally, episode_metrics, record_start
 
 ALONE, BOTH = (RunConfig(envs=8, horizon=8, tensorboard=board) for board in (False, True))
 

@@ -7,16 +7,16 @@ import pytest
 import torch
 from torch import Tensor
 
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.frames import Batch
+from socialai_dsl.trainer.minibatch import cut_out
+from socialai_dsl.trainer.nets import ActorCritic
+from socialai_dsl.trainer.nets.memory import emptied
+from socialai_dsl.trainer.rollout import Rollout, collect
+from socialai_dsl.trainer.session import Session
 from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.config import RunConfig
-from trainer.frames import Batch
-from trainer.minibatch import cut_out
-from trainer.nets import ActorCritic
-from trainer.nets.memory import emptied
-from trainer.rollout import Rollout, collect
-from trainer.session import Session
 
 STEPS, ENVS, STRETCH = 12, 6, 4
 

@@ -10,13 +10,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.frames import Batch
+from socialai_dsl.trainer.minibatch import cut_out
+from socialai_dsl.trainer.ppo import compute_gae, estimate_advantages, ppo_loss, update
+from socialai_dsl.trainer.rollout import collect
+from socialai_dsl.trainer.session import Session
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import RunConfig
-from trainer.frames import Batch
-from trainer.minibatch import cut_out
-from trainer.ppo import compute_gae, estimate_advantages, ppo_loss, update
-from trainer.rollout import collect
-from trainer.session import Session
 
 SIZES = (2, 2, 2, 2)
 ENTROPY = 0.01
@@ -394,7 +394,7 @@ def test_threads_can_share_a_network(
 
 
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trainer.nets.ActorCritic.smallest_share", 1)
+    monkeypatch.setattr("socialai_dsl.trainer.nets.ActorCritic.smallest_share", 1)
     nets = []
     for threads in (1, 2):
         session, rollout = played(small_config(minibatches=1, epochs=1, threads=threads))

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import torch
 
+from socialai_dsl.trainer.bonus import BatchStep
+from socialai_dsl.trainer.errors import ObservationError, TrainingStopped
+from socialai_dsl.trainer.features import Actor
+from socialai_dsl.trainer.nets import NetSpec, build_net
+from socialai_dsl.trainer.nets.memory import emptied
+from socialai_dsl.trainer.rollout import Rollout, collect
+from socialai_dsl.trainer.session import Session
 from tests.quick import one_in
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.bonus import BatchStep
-from trainer.errors import ObservationError, TrainingStopped
-from trainer.features import Actor
-from trainer.nets import NetSpec, build_net
-from trainer.nets.memory import emptied
-from trainer.rollout import Rollout, collect
-from trainer.session import Session
 
 
 class Witness(EchoEnvs):

@@ -20,14 +20,14 @@ from gymnasium.vector import AutoresetMode
 
 import socialai_dsl
 from socialai_dsl.evaluation import evaluate_policy
+from socialai_dsl.trainer import ppo
+from socialai_dsl.trainer.checkpoint import read
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.curricula import Tutor
+from socialai_dsl.trainer.errors import CheckpointError, TrainingStopped
+from socialai_dsl.trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.training import train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer import ppo
-from trainer.checkpoint import read
-from trainer.config import RunConfig
-from trainer.curricula import Tutor
-from trainer.errors import CheckpointError, TrainingStopped
-from trainer.play import CheckpointPolicy
-from trainer.training import train
 
 ROOT = Path(__file__).parents[2]
 
@@ -356,9 +356,9 @@ import resource, sys
 sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import RunConfig
-from trainer.errors import TrainingStopped
-from trainer.training import train
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.errors import TrainingStopped
+from socialai_dsl.trainer.training import train
 
 config = RunConfig(envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, tensorboard=False, checkpoint_every=3)
 
@@ -389,8 +389,8 @@ import sys
 sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import RunConfig
-from trainer.training import train
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.training import train
 
 config = RunConfig.model_validate_json(sys.argv[1])
 run_dir = Path({str(tmp_path / "killed")!r})

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.trainer.checkpoint import CheckpointMeta, write
+from socialai_dsl.trainer.play import CheckpointPolicy, TransferWarning, warn_of_differences
+from socialai_dsl.trainer.session import Session
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.checkpoint import CheckpointMeta, write
-from trainer.play import CheckpointPolicy, TransferWarning, warn_of_differences
-from trainer.session import Session
 
 
 def meta_of(small_config: Any, **changes: Any) -> CheckpointMeta:

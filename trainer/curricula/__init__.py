@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from socialai_dsl.frontend import load_curriculum
-from trainer.curricula.base import Curriculum, Leaves, Tutor
-from trainer.curricula.even import EvenFrames
-from trainer.curricula.phases import Phases
-from trainer.curricula.progress import LearningProgress
-from trainer.extensions import load_class
+from socialai_dsl.trainer.curricula.base import Curriculum, Leaves, Tutor
+from socialai_dsl.trainer.curricula.even import EvenFrames
+from socialai_dsl.trainer.curricula.phases import Phases
+from socialai_dsl.trainer.curricula.progress import LearningProgress
+from socialai_dsl.trainer.extensions import load_class
 
 __all__ = ["Curriculum", "Leaves", "Phases", "Tutor", "build_curriculum"]
 

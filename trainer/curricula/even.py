@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from trainer.curricula.base import Leaves
+from socialai_dsl.trainer.curricula.base import Leaves
 
 WINDOW = 100
 _ONE = 1 << 16

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from socialai_dsl.schema.curriculum import Curriculum, Group, Ramp
-from trainer.curricula.base import Leaves
+from socialai_dsl.trainer.curricula.base import Leaves
 
 _ONE = 1 << 20
 

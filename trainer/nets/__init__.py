@@ -6,12 +6,12 @@ from pathlib import Path
 
 import torch
 
-from trainer.extensions import load_class
-from trainer.nets.base import ActorCritic, NetSpec, Precision
-from trainer.nets.fast import FastNet
-from trainer.nets.memory import Memory
-from trainer.nets.paper import PaperNet, PaperReferenceNet
-from trainer.nets.relations import RelationsNet, SpeakersNet
+from socialai_dsl.trainer.extensions import load_class
+from socialai_dsl.trainer.nets.base import ActorCritic, NetSpec, Precision
+from socialai_dsl.trainer.nets.fast import FastNet
+from socialai_dsl.trainer.nets.memory import Memory
+from socialai_dsl.trainer.nets.paper import PaperNet, PaperReferenceNet
+from socialai_dsl.trainer.nets.relations import RelationsNet, SpeakersNet
 
 __all__ = [
     "ActorCritic",
@@ -44,7 +44,7 @@ def net_class(name: str, folder: Path = Path()) -> type[ActorCritic]:
         return _SHIPPED[name]
     found: type = load_class(name, "net", tuple(_SHIPPED), ActorCritic, folder)
     if not issubclass(found, ActorCritic):
-        raise ValueError(f"net: got {name!r}, expected a subclass of trainer.nets.ActorCritic")
+        raise ValueError(f"net: got {name!r}, expected a subclass of socialai_dsl.trainer.nets.ActorCritic")
     return found
 
 

@@ -12,10 +12,10 @@ import torch
 from gymnasium import spaces
 from torch import Tensor, nn
 
-from trainer.nets.dialogue import DialogueEncoder
-from trainer.nets.memory import LstmMemory, Memory
-from trainer.nets.reading import Reader
-from trainer.nets.sight import Sight
+from socialai_dsl.trainer.nets.dialogue import DialogueEncoder
+from socialai_dsl.trainer.nets.memory import LstmMemory, Memory
+from socialai_dsl.trainer.nets.reading import Reader
+from socialai_dsl.trainer.nets.sight import Sight
 
 Precision = Literal["float32", "bfloat16"]
 

@@ -8,9 +8,9 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from trainer.nets.base import ActorCritic, NetSpec
-from trainer.nets.dialogue import HeardWords
-from trainer.nets.lines import Together
+from socialai_dsl.trainer.nets.base import ActorCritic, NetSpec
+from socialai_dsl.trainer.nets.dialogue import HeardWords
+from socialai_dsl.trainer.nets.lines import Together
 
 
 class Cells:

@@ -9,8 +9,8 @@ from math import sqrt
 import torch
 from torch import Tensor, nn
 
+from socialai_dsl.trainer.nets.dialogue import DialogueEncoder, HeardWords, PrefixTree
 from socialai_dsl.vocabulary import words
-from trainer.nets.dialogue import DialogueEncoder, HeardWords, PrefixTree
 
 
 class Together(DialogueEncoder):

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.trainer.nets.sight import ORIENTATION, Int64, MapSight
 from socialai_dsl.vocabulary import WALL
-from trainer.nets.sight import ORIENTATION, Int64, MapSight
 
 
 class NamingSight(MapSight):

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from trainer.nets.base import ActorCritic, NetSpec, unit_row_linear
-from trainer.nets.dialogue import GruEncoder
-from trainer.nets.reading import LetterReader
+from socialai_dsl.trainer.nets.base import ActorCritic, NetSpec, unit_row_linear
+from socialai_dsl.trainer.nets.dialogue import GruEncoder
+from socialai_dsl.trainer.nets.reading import LetterReader
 
 
 class _Conv(nn.Conv2d):

@@ -7,13 +7,13 @@ from typing import Final
 import torch
 from torch import Tensor, nn
 
+from socialai_dsl.trainer.nets.base import NetSpec
+from socialai_dsl.trainer.nets.dialogue import HeardWords
+from socialai_dsl.trainer.nets.fast import Cells, FastNet
+from socialai_dsl.trainer.nets.lines import HeardOrder, HeardSpeakers, Together, marks, word_weights
+from socialai_dsl.trainer.nets.naming import NamingSight
+from socialai_dsl.trainer.nets.sight import MapSight, Sight
 from socialai_dsl.vocabulary import COLORS
-from trainer.nets.base import NetSpec
-from trainer.nets.dialogue import HeardWords
-from trainer.nets.fast import Cells, FastNet
-from trainer.nets.lines import HeardOrder, HeardSpeakers, Together, marks, word_weights
-from trainer.nets.naming import NamingSight
-from trainer.nets.sight import MapSight, Sight
 
 _COLOR: Final = 1
 """The channel of colours."""

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.trainer.errors import ObservationError
 from socialai_dsl.vocabulary import DIRECTIONS, EMPTY, NPC, WALL
-from trainer.errors import ObservationError
 
 Int64 = NDArray[np.int64]
 

@@ -129,7 +129,7 @@ def test_a_network_of_ones_own_goes_along(
     project.mkdir()
     shutil.copy(place / "corridor.yaml", project)
     (project / "mine.py").write_text(
-        "from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = 4\n"
+        "from socialai_dsl.trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = 4\n"
     )
     monkeypatch.chdir(tmp_path)
     assert run_main(["project/corridor.yaml", *QUICK, "--net", "mine:Net", "--out", "run"]) == 0

@@ -14,8 +14,8 @@ import torch
 
 from socialai_dsl.cli.main import run_main
 from socialai_dsl.errors import UsageError
-from trainer import checkpoint as checkpoints
-from trainer.checkpoint import read
+from socialai_dsl.trainer import checkpoint as checkpoints
+from socialai_dsl.trainer.checkpoint import read
 
 pytestmark = pytest.mark.thorough("trains on disks that fail")
 

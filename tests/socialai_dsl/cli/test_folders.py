@@ -21,7 +21,7 @@ from socialai_dsl.episodes import EvalResult, Player, RandomPolicy
 from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.runs import folder as run_folder
 from socialai_dsl.runs.folder import only_writer
-from trainer.play import CheckpointPolicy
+from socialai_dsl.trainer.play import CheckpointPolicy
 
 Capture = pytest.CaptureFixture[str]
 

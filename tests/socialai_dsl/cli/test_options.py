@@ -10,7 +10,7 @@ import pytest
 from socialai_dsl.cli.main import _COMMANDS, main
 from socialai_dsl.cli.model_options import MODEL_OPTIONS
 from socialai_dsl.model_options import meanings
-from trainer.config import HYPER
+from socialai_dsl.trainer.config import HYPER
 
 Capture = pytest.CaptureFixture[str]
 

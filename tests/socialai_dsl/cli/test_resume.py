@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 
-from trainer.checkpoint import read
+from socialai_dsl.trainer.checkpoint import read
 
 pytestmark = pytest.mark.thorough("kills and resumes whole processes")
 

@@ -18,7 +18,7 @@ from socialai_dsl.cli.run_options import given_options
 from socialai_dsl.errors import UsageError
 from socialai_dsl.runs.folder import Run
 from socialai_dsl.runs.options import new_config, usual_options
-from trainer.config import RunConfig, configure
+from socialai_dsl.trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -361,8 +361,8 @@ def test_wandb_that_is_not_installed(capsys: Capture, monkeypatch: pytest.Monkey
 
 MINE = """
 import numpy as np
-from trainer.guides import Lead
-from trainer.nets import FastNet
+from socialai_dsl.trainer.guides import Lead
+from socialai_dsl.trainer.nets import FastNet
 
 class Net(FastNet):
     kind_size = 4
@@ -502,7 +502,7 @@ def test_a_loss_of_ones_own_that_is_not_finite_ends_the_run_and_loses_nothing(ca
     """In the third update; the checkpoint after the second is there, and so are its rows."""
     Path("mine.py").write_text(
         "import torch\n"
-        "from trainer.auxiliary import AuxiliaryLoss\n"
+        "from socialai_dsl.trainer.auxiliary import AuxiliaryLoss\n"
         "class Loss(AuxiliaryLoss):\n"
         "    def __init__(self, config, net):\n"
         "        super().__init__(config, net)\n"

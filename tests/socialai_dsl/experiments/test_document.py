@@ -229,7 +229,7 @@ def test_conditions_that_both_files_have_are_the_same_runs(shipped):
 
 
 def test_the_hyper_parameters_are_those_of_the_trainer():
-    from trainer.config import FLAGS, HYPER, RunConfig
+    from socialai_dsl.trainer.config import FLAGS, HYPER, RunConfig
 
     assert set(Hyper.model_fields) == set(HYPER)
     assert set(FLAGS) - {"agent", "seed", "frames", "wandb"} < set(Settings.model_fields)
@@ -257,8 +257,8 @@ conditions:
 
 
 def test_the_networks_are_those_of_the_trainer():
-    from trainer import nets
-    from trainer.config import NET_PRESETS
+    from socialai_dsl.trainer import nets
+    from socialai_dsl.trainer.config import NET_PRESETS
 
     assert set(NETS) == set(nets._SHIPPED) >= set(NET_PRESETS)
 

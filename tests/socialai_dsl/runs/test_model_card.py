@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from socialai_dsl.cli.main import main, run_main
-from trainer.config import WITHOUT_EFFECT
+from socialai_dsl.trainer.config import WITHOUT_EFFECT
 
 QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "30", "--device", "cpu"]
 

@@ -58,7 +58,7 @@ def test_the_partners_stay_as_they_are(partner: sd.Run, tmp_path: Path) -> None:
     run = sd.train(
         LEVERS, out=tmp_path / "run", frames=512, seats={"partner": str(partner.folder)}, **OPTIONS
     )
-    from trainer import checkpoint as checkpoints
+    from socialai_dsl.trainer import checkpoint as checkpoints
 
     kept = checkpoints.read_agent(run.folder / "partners" / "partner-0-partner.safetensors")
     assert kept.tensors.keys() == {name for name in kept.tensors if name.startswith("net.")}

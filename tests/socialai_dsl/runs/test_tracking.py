@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from socialai_dsl.runs.tracking import TrackingWarning, WandbTracker
+from socialai_dsl.trainer.config import RunConfig
+from socialai_dsl.trainer.training import train
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import RunConfig
-from trainer.training import train
 
 CONFIG = RunConfig(
     envs=8,

@@ -5,8 +5,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from socialai_dsl.trainer.nets.dialogue import DialogueEncoder, GruEncoder, HeardWords, prefix_tree
 from tests.trainer.plain import encode
-from trainer.nets.dialogue import DialogueEncoder, GruEncoder, HeardWords, prefix_tree
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from trainer.nets.memory import LstmMemory, Memory, emptied
+from socialai_dsl.trainer.nets.memory import LstmMemory, Memory, emptied
 
 
 @pytest.mark.parametrize("reset_rate", [0.0, 0.3, 1.0])

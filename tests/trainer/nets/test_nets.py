@@ -6,10 +6,10 @@ import torch
 from torch.nn import functional
 
 import socialai_dsl as sd
-from trainer.nets import NetSpec, build_net, net_class
-from trainer.nets.base import unit_row_linear
-from trainer.nets.fast import Cells, FastNet
-from trainer.nets.paper import PaperNet
+from socialai_dsl.trainer.nets import NetSpec, build_net, net_class
+from socialai_dsl.trainer.nets.base import unit_row_linear
+from socialai_dsl.trainer.nets.fast import Cells, FastNet
+from socialai_dsl.trainer.nets.paper import PaperNet
 
 WORDS = ("<pad>", "<unk>", *(a + b for a in "abcdef" for b in "ghijkl"), "it's", "3")
 SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), WORDS)
@@ -222,7 +222,9 @@ def test_equal_seeds_build_equal_networks_and_leave_torch_s_generator_alone() ->
     assert not all(torch.equal(one[name], third[name]) for name in one)
 
 
-@pytest.mark.parametrize("name", ["slow", "no_such_module_here:Net", "trainer.nets:Nothing", ":", "a:"])
+@pytest.mark.parametrize(
+    "name", ["slow", "no_such_module_here:Net", "socialai_dsl.trainer.nets:Nothing", ":", "a:"]
+)
 def test_an_unknown_network_is_a_value_error(name: str) -> None:
     with pytest.raises(ValueError, match="net: "):
         net_class(name)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.features import Actor
-from trainer.nets import NetSpec, build_net
-from trainer.nets.reading import LetterReader, Reader
+from socialai_dsl.trainer.features import Actor
+from socialai_dsl.trainer.nets import NetSpec, build_net
+from socialai_dsl.trainer.nets.reading import LetterReader, Reader
 
 VOCABULARY = ("<pad>", "<unk>", "eve", "it's", "3", "you", "r2d2", "coins")
 OPENING = ["this", "is", "what", "you", "hear"]

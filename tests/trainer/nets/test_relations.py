@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import torch
 
+from socialai_dsl.trainer.nets import NetSpec
+from socialai_dsl.trainer.nets.dialogue import HeardWords, prefix_tree
+from socialai_dsl.trainer.nets.fast import Cells
+from socialai_dsl.trainer.nets.lines import HeardOrder, Together
+from socialai_dsl.trainer.nets.naming import NamingSight
+from socialai_dsl.trainer.nets.relations import RelationsNet
+from socialai_dsl.trainer.nets.sight import MapSight, Sight
 from tests.trainer.nets.test_dialogue import conversations, encode_one_by_one, encode_tree
-from trainer.nets import NetSpec
-from trainer.nets.dialogue import HeardWords, prefix_tree
-from trainer.nets.fast import Cells
-from trainer.nets.lines import HeardOrder, Together
-from trainer.nets.naming import NamingSight
-from trainer.nets.relations import RelationsNet
-from trainer.nets.sight import MapSight, Sight
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
 

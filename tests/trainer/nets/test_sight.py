@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.errors import ObservationError
-from trainer.nets import NetSpec
-from trainer.nets.naming import NamingSight
-from trainer.nets.sight import MapSight, Sight
+from socialai_dsl.trainer.errors import ObservationError
+from socialai_dsl.trainer.nets import NetSpec
+from socialai_dsl.trainer.nets.naming import NamingSight
+from socialai_dsl.trainer.nets.sight import MapSight, Sight
 
 BOX, DOOR, BALL = 7, 4, 6
 NPC = 11

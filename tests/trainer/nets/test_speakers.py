@@ -5,9 +5,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from trainer.nets import NetSpec, SpeakersNet
-from trainer.nets.dialogue import prefix_tree
-from trainer.nets.lines import HeardSpeakers
+from socialai_dsl.trainer.nets import NetSpec, SpeakersNet
+from socialai_dsl.trainer.nets.dialogue import prefix_tree
+from socialai_dsl.trainer.nets.lines import HeardSpeakers
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Old Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
 
