@@ -114,8 +114,21 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
     "web": ({"traces"}, {"starlette"}),
+    "study.columns": (set(), set()),
+    "study.log": ({"errors"}, set()),
+    "study.progress": (TEXT_SIDE | {"study.log"}, set()),
+    "study.arena": (
+        TEXT_SIDE | {"errors", "program", "program_suite", "envs", "episodes", "traces", "llm"},
+        {"numpy"},
+    ),
+    "study.replay": (
+        TEXT_SIDE
+        | {"errors", "episodes", "traces", "study.columns", "study.log", "study.progress", "study.arena"},
+        set(),
+    ),
     "study": (
         TEXT_SIDE
+        | {"study.columns", "study.log", "study.progress", "study.arena", "study.replay"}
         | {
             "errors",
             "atomic",
@@ -138,7 +151,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE
         | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "traces", "evaluation"}
         | {"baselines", "experiments", "model_options", "reporting"}
-        | {"runs.folder", "runs.options", "runs.versions"},
+        | {"runs.folder", "runs.options", "runs.versions", "study.log", "study.replay"},
         {"pydantic", "yaml", "trainer"},
     ),
     "experiments": (

@@ -1,4 +1,4 @@
-"""`socialai report`: writes a page about an experiment or single runs, with figures and tables."""
+"""`socialai report`: writes a page about an experiment, single runs and studies, with figures and tables."""
 
 import argparse
 import math
@@ -14,13 +14,20 @@ if TYPE_CHECKING:  # it loads pandas, which is only there if reports were asked 
 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 
-EXAMPLES: Final = (("socialai report runs/gate --no-baselines", "one run or several"),)
+EXAMPLES: Final = (
+    ("socialai report runs/gate --no-baselines", "one run or several"),
+    ("socialai report runs/minds studies/asking --out report", "with the people of a study"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "folders", nargs="+", type=Path, metavar="DIR", help="the folder of an experiment, or folders of runs"
+        "folders",
+        nargs="+",
+        type=Path,
+        metavar="DIR",
+        help="the folder of an experiment, or folders of runs; and those of studies, whose people are joined with them",
     )
     parser.add_argument(
         "--out",

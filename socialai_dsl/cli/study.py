@@ -170,7 +170,8 @@ def _status(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
 
 
 def _data(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
-    from socialai_dsl.study.data import study_data, write_data
+    from socialai_dsl.study.data import write_data
+    from socialai_dsl.study.replay import study_data
 
     folder = _folder(arguments, loaded)
     data = study_data(loaded, folder)

@@ -602,6 +602,17 @@ class Table(Copied):
             speakers[players, k], lines[players, k] = speaker_of[said], text_of[said]
         return HeardLines(speakers, lines)
 
+    def frame_states(self) -> NDArray[np.int64]:
+        """The state, or the entry of `steps`, that each frame of each row is in, by number, int64 (E, F); -1 none."""
+        most = max(program.header(Header.FRAMES) for program in self.programs)
+        found = np.full((self.rows, most), -1, np.int64)
+        played = self.batch.program_numbers()
+        for number, program in enumerate(self.programs):
+            rows = np.flatnonzero(played == number)
+            registers = program.table(Header.FRAME_AT)[:, FrameColumn.STATE]
+            found[rows, : len(registers)] = self.state.registers[rows[:, None], registers]
+        return found
+
     def _spoken(self) -> Iterator[tuple[int, int, NDArray[np.int64], NDArray[np.int32]]]:
         """The lines heard in the last step: program, position, the players who heard one there, its number for each."""
         registers, played = self.state.registers, self.batch.program_numbers()

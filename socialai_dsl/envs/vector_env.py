@@ -327,6 +327,15 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         heard = self._table.heard_lines()
         return HeardLines(heard.speakers[self._own], heard.lines[self._own])
 
+    def frame_states(self) -> NDArray[np.int64]:
+        """The state, or the entry of `steps`, that each frame of a game is in now.
+
+        Returns:
+            Their numbers in the order of the file, int64 (G, F): a row for each game, which has a frame for each member
+            of the cast that follows one, in the order of the cast; -1 behind the last.
+        """
+        return self._table.frame_states()
+
     def history_ids(self) -> NDArray[np.int64]:
         """An id of all that was heard since the reset, int64 (E,): equal for equal histories, 0 for none."""
         return self._table.history_ids()[self._own]

@@ -44,8 +44,8 @@ from socialai_dsl.traces.tracing import Answers
 if TYPE_CHECKING:  # it needs Textual
     from socialai_dsl.play.game import FinishedEpisode
 
-# Test episodes played together: enough to be fast, and no result depends on it.
-_TOGETHER: Final = 125
+TOGETHER: Final = 125
+"""Test episodes played together: enough to be fast, and no result depends on it."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,24 @@ class _Played:
     seat: Seat
     partners: Partners
 
+    @property
+    def scripts(self) -> list[Seat]:
+        """The seats that followed their scripts by themselves."""
+        seats = seats_of(self.program)
+        return [seat for seat in seats if seat != AGENT and self.partners.get(seat, self.player).is_script]
+
+    @property
+    def own(self) -> Seat:
+        """The seat from which an episode is seen."""
+        return AGENT if self.seat in self.scripts else self.seat
+
     def replayed(self, number: int) -> tuple[dict[Seat, Any] | None, list[NDArray[np.int64]]]:
         """Who fills the other seats when an episode is played again, and the own actions.
 
         It is seen from the player's seat; where nobody sat there, but its script played by itself, from the agent's.
         """
-        seats = seats_of(self.program)
-        scripts = [seat for seat in seats if seat != AGENT and self.partners.get(seat, self.player).is_script]
-        own = AGENT if self.seat in scripts else self.seat
-        others, actions = replayed_seats(seats, own, scripts, self.actions[number])
+        seats, scripts = seats_of(self.program), self.scripts
+        others, actions = replayed_seats(seats, self.own, scripts, self.actions[number])
         return ({} if others is None and len(seats) > 1 else others), actions
 
     def traces(
@@ -171,8 +180,19 @@ class Evaluation:
 
     @property
     def granted(self) -> dict[str, Any]:
-        """What the player was told and saw, as results record it."""
-        return {**self.briefing.record(), "view": self.player.view}
+        """What the player was told and saw, and how much of it it kept, as results record it.
+
+        `feedback` says whether it was told the `outcome` of an episode before the next one, `history` how many
+        observations a request to a language model has, None: all of the episode or session.
+        """
+        is_told = self.player.is_person or (self.player.is_model and self.trials > 1)
+        options = self.player.options if self.player.is_model else None
+        return {
+            **self.briefing.record(),
+            "view": self.player.view,
+            "feedback": "outcome" if is_told else "none",
+            "history": None if options is None else options.history,
+        }
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
@@ -246,6 +266,16 @@ class Evaluation:
         cut_short = {n: self.result.names[self.result.outcome[n]] for n in chosen if self.is_cut_short(n)}
         texts = {one.name: one.text for one in self.endings}
         return self._episodes.traces(chosen, texts, self.replies, cut_short)
+
+    @property
+    def scripts(self) -> list[Seat]:
+        """The seats that followed their scripts by themselves, and have no actions of their own."""
+        return self._episodes.scripts
+
+    @property
+    def own(self) -> Seat:
+        """The seat from which episodes are seen again: the player's, or the agent's where its script played."""
+        return self._episodes.own
 
     @property
     def _episodes(self) -> _Played:
@@ -350,10 +380,10 @@ def _with_idle(partners: Partners, own: Seat, program: Playable) -> Partners:
 def _playing(
     player: Player, partners: Partners, scenario: str, loaded: Loaded, program: Playable, sessions: int
 ) -> AbstractContextManager[Company]:
-    """Rooms for this number of sessions, at most `_TOGETHER` at once, with a player and its partners."""
+    """Rooms for this number of sessions, at most `TOGETHER` at once, with a player and its partners."""
     players = {seat: partners.get(seat, player) for seat in seats_of(program)}
     own = own_seat(partners, program)
-    return company(players, own, scenario, loaded, program, min(_TOGETHER, sessions))
+    return company(players, own, scenario, loaded, program, min(TOGETHER, sessions))
 
 
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:

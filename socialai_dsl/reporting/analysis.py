@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any, Final
 
@@ -12,8 +13,9 @@ import pandas as pd
 
 from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, RunRecord
+from socialai_dsl.reporting.minds import Mind
 from socialai_dsl.reporting.published import Figure, against_published
-from socialai_dsl.reporting.records import CrossPlayRecord, EndingRecord, WordsRecord
+from socialai_dsl.reporting.records import EndingRecord
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
     Estimate,
@@ -22,7 +24,6 @@ from socialai_dsl.reporting.statistics import (
     bootstrapped_iqm,
     compare,
     frames_to,
-    mean_interval,
     paired_difference,
 )
 
@@ -71,6 +72,11 @@ class Summary:
         self.seeds = align(curves) if curves else None
         self.short = _too_short(condition, self.success, self.seeds)
         self.endings: dict[str, EndingRecord] = {e.outcome: e for figures in done for e in figures.endings}
+
+    @cached_property
+    def mind(self) -> Mind:
+        """The condition by its single episodes."""
+        return Mind(self.condition)
 
     @property
     def successes(self) -> frozenset[str]:
@@ -244,13 +250,21 @@ def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
         if shared:  # conditions that would share a place in the table get rows of their own
             summary.row = summary.name
     section = Section(group, summaries)
-    comparisons = [_comparison(*pair) for pair in section.pairs() if all(len(one.success) for one in pair)]
+    pairs = [
+        pair for pair in section.pairs() if all(len(one.success) for one in pair) and not _same_people(*pair)
+    ]
+    comparisons = [_comparison(*pair) for pair in pairs]
     for one, p in zip(comparisons, bonferroni([one["p"] for one in comparisons]), strict=True):
         one["p_bonferroni"] = p
     published = against_published([figure for summary in summaries for figure in summary.figures])
     rooms = [row for pair in section.pairs() if (row := pair_by_room(*pair)) is not None]
     columns, common = _columns(section) if section.is_table else ([], 0)
     return Section(group, summaries, comparisons, published, rooms, columns, common)
+
+
+def _same_people(first: Summary, second: Summary) -> bool:
+    """Whether both are of one study, whose people are not independent samples."""
+    return first.condition.study != "" and first.condition.study == second.condition.study
 
 
 def _comparison(first: Summary, second: Summary) -> dict[str, Any]:
@@ -296,7 +310,7 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
     """Interquartile means of the columns, and in how many rows all of them have results."""
     scores: dict[str, dict[str, list[float]]] = {}
     for summary in section.summaries:
-        if len(summary.success):
+        if len(summary.success) and not summary.condition.study:  # people are no seeds
             scores.setdefault(summary.column, {})[summary.row] = list(summary.success)
     common = [row for row in section.by("row") if scores and all(row in rows for rows in scores.values())]
     found = []
@@ -306,177 +320,3 @@ def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
         runs = sum(map(len, rows.values()))
         found.append({"column": column, "rows": len(rows), "runs": runs, "iqm": estimate, "common": shared})
     return found, len(common)
-
-
-# -- tables for other programs -----------------------------------------------------------------------------------------
-
-
-def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
-    """Name of a table -> the table: runs, conditions, published, comparisons, rooms, outcomes, results by draws and by
-    seats, cross-play, words.
-    """
-    conditions, sections = analysis.experiment.conditions, analysis.sections
-    rows = {
-        "runs": [_run(condition, run) for condition in conditions for run in condition.runs],
-        "conditions": [_condition(summary) for summary in analysis.summaries],
-        "published": [one for section in sections for one in section.published],
-        "comparisons": [one for section in sections for one in section.comparisons],
-        "rooms": [one for section in sections for one in section.rooms],
-        "outcomes": [row for condition in conditions for row in _outcomes(condition)],
-        "results_by": [row for condition in conditions for row in _results_by(condition)],
-        "seats": [row for condition in conditions for row in _seats(condition)],
-        "crossplay": [row for one in analysis.experiment.crossplays for row in _pairs(one)],
-        "words": [row for one in analysis.experiment.words for row in _said(one)],
-    }
-    return {name: pd.DataFrame(some, dtype=object) for name, some in rows.items()}
-
-
-def _place(condition: Condition) -> dict[str, Any]:
-    entry = condition.entry
-    named = {name: getattr(entry, name) for name in ("group", "row", "column", "scenario", "agent")}
-    return {"condition": entry.name, **named}
-
-
-def _run(condition: Condition, run: RunRecord) -> dict[str, Any]:
-    figures, result = run.figures, run.result
-    told = figures.model_dump() if figures else {}
-    return {
-        **_place(condition),
-        "id": run.id,
-        "seed": run.seed,
-        "state": run.state,
-        "frames": run.frames,
-        **{name: told.get(name) for name in ("success_rate", "mean_return", "mean_length")},
-        "test_episodes": told.get("episodes"),
-        **{name: told.get(name) for name in ("replies", "invalid_replies")},
-        "tokens": figures.prompt_tokens + figures.completion_tokens if figures else None,
-        "cost": told.get("cost"),
-        "train_seconds": result.train_seconds if result else None,
-        "frames_per_second": result.frames_per_second if result else None,
-        "tests": "; ".join(f"{name}={one.success_rate:.6g}" for name, one in run.tests.items()),
-        "program_sha256": result.program_sha256 if result else None,
-        "config_sha256": run.digest or None,
-        "problems": "; ".join(run.problems),
-    }
-
-
-def _condition(summary: Summary) -> dict[str, Any]:
-    success, reference = summary.success, summary.condition.entry.reference
-    low, high = mean_interval(list(success)) or (None, None)
-    return {
-        **_place(summary.condition),
-        "row": summary.row,
-        "column": summary.column,
-        "seeds": len(summary.condition.runs),
-        "seeds_done": len(success),
-        "success_mean": success.mean() if len(success) else None,
-        "success_std": success.std() if len(success) > 1 else None,
-        "success_low": low,
-        "success_high": high,
-        "published_mean": reference.mean if reference else None,
-        "published_std": reference.std if reference else None,
-        "published_n": reference.n if reference else None,
-        "published_source": reference.source if reference else None,
-        "area_mean": summary.areas.mean() if len(summary.areas) else None,
-        **{
-            f"seeds_reaching_{level:.2f}": sum(frames is not None for frames in summary.reached(level))
-            for level in THRESHOLDS
-        },
-        "tests": "; ".join(
-            f"{name}={rates.mean():.6g}" for name, rates in summary.tests.items() if len(rates)
-        ),
-        "too_short": "; ".join(summary.short),
-    }
-
-
-def _results_by(condition: Condition) -> list[dict[str, Any]]:
-    """Success in the test episodes with each value of a draw by which results are told apart, by run."""
-    return [
-        {
-            "condition": condition.entry.name,
-            "id": run.id,
-            "seed": run.seed,
-            "draw": draw,
-            "value": value,
-            "test_episodes": part.episodes,
-            "success_rate": part.success_rate,
-        }
-        for run in condition.done
-        for draw, values in (run.figures.results_by if run.figures is not None else {}).items()
-        for value, part in values.items()
-    ]
-
-
-def _seats(condition: Condition) -> list[dict[str, Any]]:
-    """Success of each seat of a scenario with several, by run."""
-    return [
-        {
-            "condition": condition.entry.name,
-            "id": run.id,
-            "seed": run.seed,
-            "seat": seat,
-            "test_episodes": part.episodes,
-            "success_rate": part.success_rate,
-        }
-        for run in condition.done
-        if run.result is not None
-        for seat, part in run.result.by_seat.items()
-    ]
-
-
-def _pairs(crossplay: CrossPlayRecord) -> list[dict[str, Any]]:
-    """Success of each seat with each pair of players."""
-    return [
-        {
-            "scenario": crossplay.scenario,
-            "seat": seat,
-            "agent": cell.agent,
-            "others": cell.others,
-            "test_episodes": cell.episodes,
-            "success_rate": cell.success,
-            "success_low": cell.interval[0],
-            "success_high": cell.interval[1],
-        }
-        for seat, found in crossplay.seats.items()
-        for cell in found.cells
-    ]
-
-
-def _said(words: WordsRecord) -> list[dict[str, Any]]:
-    """How often each seat says what where something has a value, and how much its messages tell of that."""
-    return [
-        {
-            "scenario": words.scenario,
-            "seat": seat,
-            "player": found.player,
-            "test_episodes": words.episodes,
-            "situation": one.name,
-            "value": value,
-            "message": message,
-            "episodes": count,
-            **(
-                dict.fromkeys(("bits", "possible", "chance", "p"))
-                if one.told is None
-                else one.told.model_dump()
-            ),
-        }
-        for seat, found in words.seats.items()
-        for one in found.situations
-        for value, said in one.said.items()
-        for message, count in said.items()
-    ]
-
-
-def _outcomes(condition: Condition) -> list[dict[str, Any]]:
-    """How often each outcome ended an episode and each rule fired in one, by run."""
-    rows = []
-    for run in condition.done:
-        assert run.figures is not None, "internal: a run that is done has figures"
-        endings = {ending.outcome: ending for ending in run.figures.endings}
-        who = {"condition": condition.entry.name, "id": run.id, "seed": run.seed}
-        for kind, rates in (("outcome", run.figures.outcomes), ("rule", run.figures.rules)):
-            for name, rate in rates.items():
-                ending = endings.get(name) if kind == "outcome" else None
-                place = {"file": getattr(ending, "file", None), "line": getattr(ending, "line", None)}
-                rows.append({**who, "kind": kind, "name": name, "per_episode": rate, **place})
-    return rows

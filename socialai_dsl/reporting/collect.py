@@ -22,14 +22,23 @@ from socialai_dsl.experiments.folder import RUNS
 from socialai_dsl.experiments.folder import read_experiment as read_document
 from socialai_dsl.experiments.record import ConditionEntry, ExperimentRecord, Record, RunEntry
 from socialai_dsl.model_options import ModelOptions
+from socialai_dsl.reporting.episodes import (
+    NO_ANSWERS,
+    NO_EPISODES,
+    NO_REACTIONS,
+    read_answers,
+    read_episodes,
+)
 from socialai_dsl.reporting.records import (
     CrossPlayRecord,
     DilemmaRecord,
     DilemmasRecord,
     Figures,
+    PublishedRecord,
     ResultRecord,
     StartRecord,
     StatusRecord,
+    StudyRecord,
     UpdateRecord,
     WordsRecord,
     described,
@@ -39,7 +48,6 @@ from socialai_dsl.runs.folder import (
     CONFIG,
     CROSSPLAY,
     DILEMMAS,
-    EPISODES,
     METRICS,
     RESULT,
     SCENARIO,
@@ -75,7 +83,8 @@ class RunRecord:
         state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it runs and no process
             works on it; `missing` where there is no folder.
         message: what its status says.
-        result: of a finished run. rooms: success by number of the test episode, where the run lists its episodes.
+        result: of a finished run. episodes: those of the test set, where the run lists them, answers: those that its
+            player got in them, reactions: of a person; see `episodes`.
         tests: scenario -> figures of its further tests.
         frames: made so far. digest: of its configuration without the seed; empty if it has none.
         starts: in what surroundings it ran.
@@ -88,7 +97,9 @@ class RunRecord:
     state: str
     message: str = ""
     result: ResultRecord | None = None
-    rooms: pd.Series = field(default_factory=lambda: pd.Series(dtype=float))
+    episodes: pd.DataFrame = field(default_factory=lambda: NO_EPISODES)
+    answers: pd.DataFrame = field(default_factory=lambda: NO_ANSWERS)
+    reactions: pd.DataFrame = field(default_factory=lambda: NO_REACTIONS)
     tests: Mapping[str, Figures] = field(default_factory=dict)
     frames: int = 0
     digest: str = ""
@@ -100,6 +111,11 @@ class RunRecord:
         """Of its test episodes, if it is done."""
         return self.result.eval if self.result is not None else None
 
+    @property
+    def rooms(self) -> pd.Series:
+        """Success by room of the test set, where the episodes are listed."""
+        return self.episodes.groupby("room").success.mean().astype(float)
+
     def updates(self) -> list[UpdateRecord] | None:
         """Its learning curve; None where there is none that can be read."""
         try:
@@ -110,10 +126,18 @@ class RunRecord:
 
 @dataclass(frozen=True)
 class Condition:
-    """Runs that differ in nothing but their seed."""
+    """Runs that differ in nothing but their seed, or people who played the same in a study.
+
+    Attributes:
+        entry: what it is. runs: of a study, one for each person.
+        study: the name of the study that people took part in; empty of runs.
+        simulated: whether these are no people but simulated participants of a rehearsal.
+    """
 
     entry: ConditionEntry
     runs: tuple[RunRecord, ...]
+    study: str = ""
+    simulated: bool = False
 
     @property
     def done(self) -> tuple[RunRecord, ...]:
@@ -122,9 +146,10 @@ class Condition:
 
     @property
     def rooms(self) -> pd.Series:
-        """Success in each test episode that all its finished runs list, as the mean over them."""
+        """Success in each room: the mean over finished runs, if all list it; of people, over those who played it."""
         listed = [run.rooms for run in self.done]
-        return pd.concat(listed, axis=1, join="inner").mean(axis=1) if listed else pd.Series(dtype=float)
+        join = "outer" if self.study else "inner"
+        return pd.concat(listed, axis=1, join=join).mean(axis=1) if listed else pd.Series(dtype=float)
 
 
 @dataclass(frozen=True)
@@ -137,6 +162,8 @@ class Experiment:
         conditions: in the order of the file.
         crossplays: of scenarios with several seats, who played how well with whom. words: what was said there.
         dilemmas: what those who cooperate and those who defect are paid there.
+        studies: what else is known of those whose people are among the conditions.
+        humans: scenario -> figures of people that its file names as published.
     """
 
     name: str
@@ -147,6 +174,8 @@ class Experiment:
     crossplays: tuple[CrossPlayRecord, ...] = ()
     words: tuple[WordsRecord, ...] = ()
     dilemmas: tuple[DilemmaRecord, ...] = ()
+    studies: tuple[StudyRecord, ...] = ()
+    humans: Mapping[str, Sequence[PublishedRecord]] = field(default_factory=dict)
 
     @property
     def scenarios(self) -> list[str]:
@@ -155,8 +184,9 @@ class Experiment:
 
     @property
     def runs(self) -> list[RunRecord]:
-        """All runs, each once, also where several conditions have it."""
-        return list({run.id: run for condition in self.conditions for run in condition.runs}.values())
+        """All runs, each once, also where several conditions have it; people are none."""
+        conditions = [condition for condition in self.conditions if not condition.study]
+        return list({run.id: run for condition in conditions for run in condition.runs}.values())
 
 
 def read_experiment(folder: Path) -> Experiment:
@@ -335,7 +365,8 @@ def _read_run(folder: Path, name: str, seed: int) -> RunRecord:
         _state(folder, status, result, frames),
         message=(status.message or "") if status is not None else "",
         result=result,
-        rooms=_rooms(folder / EPISODES, problems),
+        episodes=read_episodes(folder, result.trials if result is not None else 1, problems),
+        answers=read_answers(folder, problems),
         tests=_read(folder / TESTS, _TESTS, problems) or {},
         frames=frames,
         digest=_digest(settings) if settings is not None else "",
@@ -365,22 +396,6 @@ def _read(path: Path, form: TypeAdapter[Content], problems: list[str]) -> Conten
     except ValidationError as error:
         problems.append(f"{path.name} is damaged ({described(error)})")
     return None
-
-
-def _rooms(path: Path, problems: list[str]) -> pd.Series:
-    """Success of each test episode that a run lists; nothing where it lists none."""
-    try:
-        rooms = pd.read_csv(path, usecols=["episode", "success"], dtype=int, index_col="episode")["success"]
-        if not (rooms.isin([0, 1]).all() and rooms.index.is_unique):
-            raise ValueError
-        return rooms
-    except FileNotFoundError:
-        pass
-    except OSError as error:
-        problems.append(f"{path.name} cannot be read ({error.strerror})")
-    except (ValueError, OverflowError):  # among the former are all of the parser's
-        problems.append(f"{path.name} is damaged")
-    return pd.Series(dtype=float)
 
 
 def _settings(folder: Path, problems: list[str]) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""The figures of a report: success beside published figures, learning curves, endings, interquartile means.
+"""The figures of a report: success, also by trial, learning curves, endings, interquartile means.
 
 Each is one panel as wide as a telephone; the page sets them side by side where there is room.
 """
@@ -35,6 +35,7 @@ from socialai_dsl.reporting.style import (
     shown,
     styled,
 )
+from socialai_dsl.reporting.trials import trials_figure
 
 _LEVELS: Final = (
     ("script", "own script", "-"),
@@ -48,8 +49,8 @@ _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 
 
 def figures(analysis: Analysis) -> dict[str, Figure]:
-    """Name -> figure: for each part of the report its success, curves, endings and interquartile means; for each
-    cross-play its matrices, for each dilemma its diagram.
+    """Name -> figure: for each part of the report its success, also by trial, curves, endings and interquartile means;
+    for each cross-play its matrices, for each dilemma its diagram.
     """
     with styled():
         found = {
@@ -69,6 +70,11 @@ def _figures(section: Section, baselines: Mapping[str, Baselines]) -> Iterator[t
     yield "success", success_figure(section, baselines)
     if any(column["rows"] > 1 for column in section.columns):
         yield "iqm", iqm_figure(section)
+    columns = list(section.by("column"))
+    for place, (row, members) in enumerate(section.by("row").items(), start=1):
+        minds = [(s.column, columns.index(s.column), s.mind) for s in members if len(s.mind.episodes)]
+        if any(len(mind.trials) > 1 for _, _, mind in minds):
+            yield f"trials{place}", trials_figure(row, minds)
     for place, (row, members) in enumerate(section.panels.items(), start=1):
         if learning := [summary for summary in members if summary.seeds is not None]:
             yield f"curves{place}", curves_figure(section, row, learning, baselines)

@@ -78,6 +78,10 @@ class ResultRecord(Record):
         greedy: whether a network took its most probable actions.
         tell, told: what the player was told of the task, by member of a suite if they differ. language: of that, where
             the file says it. view: what the player saw.
+        form: of a person on a page, whether that was the `picture`, `words` or `both`.
+        feedback: whether it was told the `outcome` of an episode before the next one, or `none`; empty where an older
+            version wrote it.
+        history: how many observations a request to a language model had; None: all of them.
         trials: how many episodes in a row it remembered.
         seat: the one that it had.
     """
@@ -88,6 +92,9 @@ class ResultRecord(Record):
     told: str | dict[str, str] = ""
     language: str = ""
     view: str = "seat"
+    form: str = ""
+    feedback: str = ""
+    history: int | None = None
     trials: int = Field(1, ge=1)
     seat: str = "agent"
     frames: int = 0
@@ -305,6 +312,55 @@ class WordsRecord(Record):
     episodes: int = Field(ge=1)
     seats: dict[str, SeatWordsRecord] = Field(min_length=1)
     left_out: list[str]
+
+
+class PublishedRecord(Record):
+    """A figure of people that a scenario's file names as published: the share of `n` who `did` something."""
+
+    who: str
+    did: str
+    share: Share
+    n: int = Field(ge=1)
+    source: str
+
+
+class QuestionRecord(Record):
+    """A question of a study.
+
+    Attributes:
+        block: the block behind which it was asked; empty at the end.
+        name, ask: its name and its words. kind: `text`, `choice` or `scale`.
+        options: of a choice. start, to: of a scale, its first and last number. ends: what those two mean.
+        answers: by participant.
+    """
+
+    block: str
+    name: str
+    ask: str
+    kind: Literal["text", "choice", "scale"]
+    options: tuple[str, ...] = ()
+    start: int | None = None
+    to: int | None = None
+    ends: tuple[str, ...] = ()
+    answers: dict[str, str | int]
+
+
+class StudyRecord(Record):
+    """What a report says of a study besides the figures of its people.
+
+    Attributes:
+        name: by which the report tells it from others. simulated: whether those who took part are simulated.
+        joined: who came. excluded: reason -> how many do not count. counted: how many do.
+        unended: how many episodes had not ended. questions: with the answers of those who count.
+    """
+
+    name: str
+    simulated: bool
+    joined: int
+    counted: int
+    excluded: dict[str, int]
+    unended: int
+    questions: list[QuestionRecord]
 
 
 def described(error: ValidationError) -> str:

@@ -40,6 +40,7 @@ FAILURE: Final = "failure"
 """The name of film and transcript of a failure, without their endings."""
 
 EPISODES: Final = "episodes.csv"
+ASKED: Final = "asked.csv"
 EVALUATIONS: Final = "evaluation.json"
 """The results on several scenarios, in the folder above those of the scenarios."""
 CROSSPLAY: Final = "crossplay.json"

@@ -10,7 +10,6 @@ from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.runs.folder import (
     CARD,
     CURVE,
-    EPISODES,
     FAILURE,
     FILM,
     METRICS,
@@ -19,7 +18,7 @@ from socialai_dsl.runs.folder import (
     scenario_folder_name,
 )
 from socialai_dsl.runs.model_card import model_card
-from socialai_dsl.runs.recordings import episodes_table
+from socialai_dsl.runs.recordings import write_tables
 from socialai_dsl.traces.page import replay_page
 from socialai_dsl.trainer.config import RunConfig
 
@@ -30,9 +29,9 @@ _REPLAYED: Final = 5
 def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     """Film the first success, or the first episode if there is none, and where there are both, the first failure.
 
-    A page replays some successes and failures, and a table lists all episodes.
+    A page replays some successes and failures, and tables list all episodes, and whom the player asked.
     """
-    write_text(folder / EPISODES, episodes_table(evaluation))
+    write_tables(evaluation, folder)
     write_text(folder / REPLAY, replay_page(evaluation.traces(evaluation.to_replay(_REPLAYED))))
     success = evaluation.result.success
     shown = {(FILM, TRANSCRIPT): int(success.argmax())}

@@ -1,12 +1,16 @@
-"""What an evaluation leaves in a folder: films, transcripts, a page that replays episodes, and a list of all."""
+"""What an evaluation leaves in a folder: films, transcripts, a page of episodes, lists of episodes and of answers."""
 
 import csv
 import io
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from socialai_dsl.atomic import write_text
+from socialai_dsl.episodes.asking import Answer
+from socialai_dsl.evaluation.asked import asked_in
 from socialai_dsl.evaluation.test_set import Evaluation
-from socialai_dsl.runs.folder import EPISODES, REPLAY, only_writer, scenario_folder_name
+from socialai_dsl.runs.folder import ASKED, EPISODES, REPLAY, only_writer, scenario_folder_name
 from socialai_dsl.traces.page import replay_page
 
 
@@ -48,23 +52,37 @@ def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label
         episode.save_film(place / f"{name}.gif")
     if traces := evaluation.traces(replayed):
         write_text(place / REPLAY, replay_page(traces))
-    write_text(place / EPISODES, episodes_table(evaluation))
+    write_tables(evaluation, place)
     return place
 
 
-def episodes_table(evaluation: Evaluation) -> str:
-    """A table in CSV with a line for each test episode."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("episode", "success", "outcome", "length", "return"))
+def write_tables(evaluation: Evaluation, folder: Path) -> None:
+    """Write a table with a row for each test episode, and one with a row for each answer that the player got.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    answers, utterances = asked_in(evaluation)
     result = evaluation.result
     columns = zip(
         result.success.tolist(),
         result.outcome.tolist(),
         result.lengths.tolist(),
         result.returns.tolist(),
+        utterances,
         strict=True,
     )
-    for number, (success, outcome, length, total) in enumerate(columns):
-        writer.writerow((number, int(success), result.names[outcome], length, f"{total:.6g}"))
+    episodes = (
+        (number, int(success), result.names[outcome], length, f"{total:.6g}", said)
+        for number, (success, outcome, length, total, said) in enumerate(columns)
+    )
+    head = ("episode", "success", "outcome", "length", "return", "utterances")
+    write_text(folder / EPISODES, _csv([head, *episodes]))
+    asked = ((number, *one) for number, some in enumerate(answers) for one in some)
+    write_text(folder / ASKED, _csv([("episode", *Answer._fields), *asked]))
+
+
+def _csv(rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()

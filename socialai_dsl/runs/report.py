@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.atomic import write_text
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.episodes.players import require_trainer
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.levels import read_baselines, update_baselines
 from socialai_dsl.experiments.folder import EXPERIMENT
+from socialai_dsl.frontend import LoadedScenario, load
 from socialai_dsl.runs.folder import METRICS, only_writer
+from socialai_dsl.runs.people import is_study, with_people
 
 if TYPE_CHECKING:  # these load pandas and Matplotlib, which are only there if reports were asked for
     from socialai_dsl.baselines import Baselines
@@ -37,10 +42,11 @@ def report(
 
     Args:
         folders: that of an experiment, or those of runs and of scenarios in evaluations, such as `Evaluation.folder`;
-            besides, what `socialai crossplay --out`, `socialai words --out` and `socialai check --pictures` wrote.
+            besides, those of studies, whose people are joined with all of them room by room, and what
+            `socialai crossplay --out`, `socialai words --out` and `socialai check --pictures` wrote.
         out: folder to write (default: `report` in the experiment's folder, or here for runs).
         baselines: whether script, chance and success without NPCs are measured; otherwise only what is known is shown.
-        tell: takes a line before each scenario that is measured.
+        tell: takes a line before each scenario that is measured, and for each study with which something is wrong.
 
     Returns:
         The page, which needs nothing outside the folder.
@@ -53,11 +59,13 @@ def report(
     from socialai_dsl.reporting.analysis import analyse
 
     named = [folders] if isinstance(folders, str | Path) else list(folders)
-    experiment, place = _experiment([Path(folder) for folder in named])
+    experiment, place, remarks = _experiment([Path(folder) for folder in named])
+    for remark in remarks:
+        tell(remark)
     there = place / FOLDER if out is None else Path(out)
     with only_writer(there):
         measured, notes = _baselines(experiment, there / BASELINES, baselines, tell)
-        _write(analyse(experiment, measured, notes), there)
+        _write(analyse(experiment, measured, [*remarks, *notes]), there)
     return there / PAGE
 
 
@@ -107,20 +115,41 @@ def require_libraries(*libraries: str) -> None:
             raise UsageError(f"reports need {library}: pip install 'socialai-dsl[report]'")
 
 
-def _experiment(folders: list[Path]) -> tuple[Experiment, Path]:
-    """What the folders hold, and where its report belongs."""
+def _experiment(folders: list[Path]) -> tuple[Experiment, Path, list[str]]:
+    """What the folders hold, where its report belongs, and remarks on the studies among them."""
     from socialai_dsl.reporting.collect import read_experiment, read_figures, read_runs, with_figures
 
     try:
-        figures = {folder: read_figures(folder) for folder in folders}
-        runs = [folder for folder in folders if not figures[folder]]
+        studies = [folder for folder in folders if is_study(folder)]
+        figures = {folder: read_figures(folder) for folder in folders if folder not in studies}
+        runs = [folder for folder, found in figures.items() if not found]
         if len(runs) == 1 and (runs[0] / EXPERIMENT).exists():
             experiment, place = read_experiment(runs[0]), runs[0]
         else:
             experiment, place = read_runs(runs), Path()
-        return with_figures(experiment, [one for found in figures.values() for one in found]), place
+        found = with_figures(experiment, [one for some in figures.values() for one in some])
     except ValueError as error:
         raise UsageError(str(error)) from error
+    if not studies:
+        return _with_humans(found), place, []
+    joined, remarks = with_people(found, studies)
+    if not joined.conditions and len(studies) == len(folders):
+        raise UsageError("; ".join(remarks))
+    return _with_humans(joined), place, remarks
+
+
+def _with_humans(experiment: Experiment) -> Experiment:
+    """With the figures of people that the files of scenarios name as published, where they can be read."""
+    from socialai_dsl.reporting.records import PublishedRecord
+
+    humans = {}
+    for scenario in experiment.scenarios:
+        with contextlib.suppress(ScenarioError):
+            loaded = load(scenario)
+            published = loaded.scenario.published if isinstance(loaded, LoadedScenario) else ()
+            if published:
+                humans[scenario] = [PublishedRecord(**one.model_dump()) for one in published]
+    return replace(experiment, humans=humans)
 
 
 def _baselines(
@@ -134,10 +163,10 @@ def _baselines(
 
 
 def _write(analysis: Analysis, out: Path) -> None:
-    from socialai_dsl.reporting.analysis import tables
     from socialai_dsl.reporting.page import render_page
     from socialai_dsl.reporting.plots import figures
     from socialai_dsl.reporting.style import saved
+    from socialai_dsl.reporting.tables import tables
 
     folder = out / FIGURES
     folder.mkdir(exist_ok=True)
@@ -147,8 +176,12 @@ def _write(analysis: Analysis, out: Path) -> None:
         (folder / f"{name}.svg").write_bytes(drawings[name])
         (folder / f"{name}.png").write_bytes(saved(figure, "png"))
     for name, table in tables(analysis).items():
-        write_text(out / f"{name}.csv", table.to_csv(index=False) if len(table) else "")
-        if len(table) and importlib.util.find_spec("pyarrow") is not None:
+        if not len(table):  # what an earlier report has left there is gone
+            for kind in ("csv", "parquet"):
+                (out / f"{name}.{kind}").unlink(missing_ok=True)
+            continue
+        write_text(out / f"{name}.csv", table.to_csv(index=False))
+        if importlib.util.find_spec("pyarrow") is not None:
             table.to_parquet(out / f"{name}.parquet")
     page = render_page(analysis, drawings, version("socialai-dsl"), out)
     write_text(out / PAGE, page)  # last, so that its presence means a whole report

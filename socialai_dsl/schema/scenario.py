@@ -980,7 +980,8 @@ class Scenario(Model):
         examples=["condition"],
     )
     published: Annotated[ListOf[Published], Hides(False)] = Field(
-        (), description="figures of studies with people, which the data sheet shows; playing never reads them"
+        (),
+        description="figures of studies with people, which the data sheet and reports show; playing never reads them",
     )
     probes: dict[Word, Probe] = Field(
         default_factory=dict,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -16,7 +16,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import ScenarioVectorEnv
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.view import View
-from socialai_dsl.episodes.play import AGENT, Rooms, Seat
+from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat
 from socialai_dsl.errors import OptionError
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.program import LOOKS, VIEW
@@ -41,7 +41,7 @@ class Arena:
         language: of the instructions, where they are written in it.
 
     Attributes:
-        seats: of the game. actions: the words for movements.
+        seats: of the game. actions: the words for movements. briefing: what players are told of the task.
     """
 
     def __init__(self, loaded: Loaded, tell: Tell | None = None, language: str | None = None) -> None:
@@ -49,9 +49,9 @@ class Arena:
         self.seats = seats_of(self.program)
         self.actions = tuple(self.program.actions)
         try:
-            self._briefing = brief(loaded, tell, language=language)
+            self.briefing = brief(loaded, tell, language=language)
         except OptionError:  # the scenario's instructions are in other languages, or there are none
-            self._briefing = brief(loaded, tell if tell == "nothing" else None)
+            self.briefing = brief(loaded, tell if tell == "nothing" else None)
         self._phrases = Phrases(self.actions, self.program.sentences)
         self._texts = {seat: TextView(self.program, seat=seat) for seat in self.seats}
         self._spoken: dict[tuple[int, str], Action] = {}
@@ -101,7 +101,7 @@ class Arena:
 
     def told(self, seat: Seat, member: str | None) -> str:
         """What whoever plays a seat is told of the task and of the end of an episode."""
-        return self._texts[seat].task(self._briefing.text(member))
+        return self._texts[seat].task(self.briefing.text(member))
 
     def action(self, rooms: Rooms, movement: str | None, said: str | None) -> Action:
         """The action that words mean in a room.
@@ -172,7 +172,7 @@ class Episode:
         arena: where it is played.
         players: of each seat that is not a person's nor a script's, a policy; see `Policy`.
         reset: arguments of `env.reset`.
-        env: what it is played in.
+        env: what it is played in. observers: are told of all that happens.
 
     Attributes:
         t: steps so far. ending: None while it goes on. heard: of each seat, pairs of a step and a line.
@@ -182,12 +182,13 @@ class Episode:
     players: Mapping[Seat, Any]
     reset: Mapping[str, Any]
     env: Any
+    observers: Sequence[Observer] = ()
     t: int = 0
     ending: Ending | None = None
     heard: dict[Seat, list[tuple[int, str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.rooms = Rooms(self.env)
+        self.rooms = Rooms(self.env, self.observers)
         if len(self.rooms.names) > 1:
             self.rooms.leave_to_scripts(())
         self.rooms.begin(self.reset)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -18,9 +16,10 @@ from socialai_dsl.episodes.play import Seat
 from socialai_dsl.errors import UsageError
 from socialai_dsl.schema.study import PERSON, WHO, Question
 from socialai_dsl.study.arena import Action, Arena, Episode
-from socialai_dsl.study.log import FILE, FORMAT, Event, Log, read_log
+from socialai_dsl.study.log import FILE, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
+from socialai_dsl.study.replay import header_of, reset_of, study_file, tell_of
 from socialai_dsl.trainer.shipped import PREFIX
 
 Row = dict[str, Any]
@@ -100,6 +99,7 @@ class Live:
     Args:
         loaded: the study. folder: holds its log and everything else that is stored; it is there.
         clock: seconds that never go back.
+        simulated: whether those who take part are simulated, which the log says.
 
     Attributes:
         progress: where everybody is.
@@ -111,12 +111,17 @@ class Live:
     """
 
     def __init__(
-        self, loaded: LoadedStudy, folder: Path, clock: Callable[[], float] = time.monotonic
+        self,
+        loaded: LoadedStudy,
+        folder: Path,
+        clock: Callable[[], float] = time.monotonic,
+        simulated: bool = False,
     ) -> None:
+        self._simulated = simulated
         self._loaded, self._study, self._clock = loaded, loaded.study, clock
         self._file = folder / FILE
         self.arenas = {
-            number: Arena(one, self._tell(number), loaded.study.language)
+            number: Arena(one, tell_of(loaded, number), loaded.study.language)
             for number, one in loaded.played.items()
         }
         self.pages: dict[str, Page] = {}
@@ -130,14 +135,10 @@ class Live:
         known = self._read() if self._file.exists() and self._file.stat().st_size else 0
         self._log = Log(self._file)
         if not known:
-            self._do("study", **self._header())
+            place = study_file(loaded, folder)
+            self._do("study", **self._header(), file=place, **({"simulated": True} if simulated else {}))
         self._do("server")
         self._mend()
-
-    def _tell(self, number: int) -> Any:
-        if number == PRACTICE:
-            return None if self._study.practice is None else self._study.practice.tell
-        return self._study.blocks[number].tell
 
     def _read(self) -> int:
         """Be where the log says; how many events it has."""
@@ -163,6 +164,9 @@ class Live:
         own = self._header()
         if event["study"] != own["study"]:
             raise UsageError(f"{self._file}: holds the study {event['study']!r}, expected {own['study']!r}")
+        if bool(event.get("simulated")) != self._simulated:
+            was = "a rehearsal" if event.get("simulated") else "what people have done"
+            raise UsageError(f"{self._file}: holds {was}, and simulated participants stay apart from people")
         changed = [name for name, sha in own["programs"].items() if event["programs"].get(name) != sha]
         if changed:
             raise UsageError(
@@ -706,19 +710,6 @@ class Live:
         for number, name in enumerate(self._loaded.pictures):
             made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
         return made
-
-
-def reset_of(block: int, room: int) -> dict[str, Any]:
-    """The arguments of `env.reset` for a room of a block."""
-    return {"seed": room} if block == PRACTICE else {"options": {"test_episode": [room]}}
-
-
-def header_of(loaded: LoadedStudy, arenas: dict[int, Arena]) -> dict[str, Any]:
-    """What the first event of a log says of the study."""
-    words = [loaded.study.model_dump(mode="json"), loaded.consent, loaded.instructions]
-    digest = hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
-    programs = {loaded.played[number].name: arena.program.sha256 for number, arena in arenas.items()}
-    return {"format": FORMAT, "study": loaded.study.study, "digest": digest, "programs": programs}
 
 
 def _fits(question: Question, answer: str | int) -> bool:

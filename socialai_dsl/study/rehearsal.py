@@ -26,9 +26,8 @@ from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import closest_script
 from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
-from socialai_dsl.study.data import StudyData, block_name, study_data
-from socialai_dsl.study.live import reset_of
 from socialai_dsl.study.messages import Screen
+from socialai_dsl.study.replay import StudyData, block_name, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of
 
@@ -161,7 +160,7 @@ async def _rehearsed(
     seed: int,
     say: Callable[[str], None],
 ) -> list[Course]:
-    server = StudyServer(loaded, folder, "127.0.0.1", clock=lambda: time.monotonic() * speed)
+    server = StudyServer(loaded, folder, "127.0.0.1", clock=lambda: time.monotonic() * speed, simulated=True)
     scripts = _scripts(loaded)
     with socket.create_server(("127.0.0.1", 0), backlog=1024) as listening:
         serving = uvicorn.Server(config_of(server))

@@ -58,6 +58,7 @@ class StudyServer:
         public: what a proxy is asked for, such as `https://study.example.org`.
         embed: origins of pages of other servers that may let people take part, such as `https://lab.example.org`.
         clock: seconds that never go back, by which others are waited for.
+        simulated: whether those who take part are simulated.
 
     Attributes:
         live: the study as it goes on.
@@ -75,11 +76,12 @@ class StudyServer:
         public: str | None = None,
         embed: Collection[str] = (),
         clock: Callable[[], float] = time.monotonic,
+        simulated: bool = False,
     ) -> None:
         self._loaded, self._folder = loaded, folder
         self._words = words_of(loaded.study.language)
         self._address = Address(host, public, embed)
-        self.live = Live(loaded, folder, clock)
+        self.live = Live(loaded, folder, clock, simulated)
         self._key = _key(folder / KEY)
         self._recruited = _recruited(folder / RECRUITED)
         self._codes = {self.code(person): person for person in self.live.progress.people}

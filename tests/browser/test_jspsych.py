@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from socialai_dsl.frontend import check, load_study
-from socialai_dsl.study.data import study_data
+from socialai_dsl.study.replay import study_data
 from socialai_dsl.study.words import words_of
 
 if TYPE_CHECKING:

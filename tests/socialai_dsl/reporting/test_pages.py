@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 
 from socialai_dsl.baselines import Baselines, Level
-from socialai_dsl.reporting.analysis import Analysis, analyse, tables
+from socialai_dsl.reporting.analysis import Analysis, analyse
 from socialai_dsl.reporting.collect import read_experiment
 from socialai_dsl.reporting.page import render_page
 from socialai_dsl.reporting.plots import figures
 from socialai_dsl.reporting.style import saved
+from socialai_dsl.reporting.tables import tables
 from tests.socialai_dsl.reporting.page_reader import Page
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_tests
 
@@ -165,7 +166,8 @@ def test_tables_for_other_programs(analysis: Analysis) -> None:
     }
     assert {name: len(rows) for name, rows in found.items()} == {
         "runs": 7, "conditions": 3, "published": 2, "comparisons": 1, "rooms": 0, "outcomes": 21, "results_by": 0,
-        "seats": 0, "crossplay": 0, "words": 0,
+        "seats": 0, "crossplay": 0, "words": 0, "minds": 0, "trials": 0, "people": 0, "asked": 0, "orders": 0,
+        "exchanges": 0, "times": 0, "answers": 0, "free_text": 0, "humans": 0,
     }  # fmt: skip
     first = found["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)

@@ -6,8 +6,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from socialai_dsl.reporting.analysis import Analysis, analyse, tables
+from socialai_dsl.reporting.analysis import Analysis, analyse
 from socialai_dsl.reporting.collect import read_experiment
+from socialai_dsl.reporting.tables import tables
 from tests.socialai_dsl.reporting.page_reader import Page
 
 RESULTS = Path(__file__).parents[3] / "docs" / "results"

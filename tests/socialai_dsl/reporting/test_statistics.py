@@ -4,11 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from socialai_dsl.episodes.results import wilson_interval
 from socialai_dsl.reporting.statistics import (
     area_under,
     bonferroni,
     bootstrapped_iqm,
+    clustered_rate,
     compare,
     frames_to,
     interquartile_mean,
@@ -120,3 +124,61 @@ def test_sample_efficiency_passes_over_unknown_bins() -> None:
     assert frames_to(frames, success, 0.81) is None
     assert area_under(success) == pytest.approx(0.6)
     assert area_under(np.array([np.nan])) is None
+
+
+@given(st.lists(st.booleans(), min_size=2, max_size=60))
+def test_the_interval_of_single_episodes_is_wilsons(won: list[bool]) -> None:
+    found = clustered_rate([int(one) for one in won], [1] * len(won))
+    assert found is not None
+    assert found[1:] == pytest.approx(wilson_interval(sum(won), len(won)))
+
+
+CLUSTERS = st.lists(
+    st.integers(1, 12).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), min_size=2, max_size=20
+)
+
+
+@given(CLUSTERS)
+def test_an_interval_over_people_holds_their_rate_and_is_one_of_rates(people: list[tuple[int, int]]) -> None:
+    won, played = zip(*people, strict=True)
+    found = clustered_rate(won, played)
+    assert found is not None
+    assert found.value == pytest.approx(sum(won) / sum(played))
+    assert 0 <= found.low <= found.value <= found.high <= 1
+    assert found.low < found.high
+    low, high = wilson_interval(sum(won), sum(played))
+    assert found.low <= low + 1e-9, "never narrower than if all episodes were of different people"
+    assert found.high >= high - 1e-9
+
+
+def test_people_who_are_always_alike_count_as_people_and_not_as_episodes() -> None:
+    """Six of eight people succeed in all of their ten episodes: by hand.
+
+    p = 0.75, the residuals are 2.5 and -7.5, their variance 8/7 * (6 * 6.25 + 2 * 56.25) / 80^2 = 0.0267857, so that
+    p (1 - p) over it is 7 episodes; Student's quantiles with 79 and 7 degrees of freedom are 1.9905 and 2.3646.
+    """
+    found = clustered_rate([10] * 6 + [0] * 2, [10] * 8)
+    assert found is not None
+    trials = 7 * (1.9905 / 2.3646) ** 2
+    z = 1.959964
+    centre = (0.75 + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z * math.sqrt(0.75 * 0.25 / trials + z * z / (4 * trials**2)) / (1 + z * z / trials)
+    assert found == pytest.approx((0.75, centre - half, centre + half), abs=1e-4)
+
+
+def test_of_one_cluster_no_interval_is_known() -> None:
+    assert clustered_rate([3], [5]) is None
+    with pytest.raises(ValueError, match="got 0 and 0 clusters"):
+        clustered_rate([], [])
+
+
+def test_intervals_over_people_hold_the_rate_about_as_often_as_they_say() -> None:
+    """1,000 studies of 15 people with 6 episodes each, whose rates are drawn from a beta distribution of mean 0.7."""
+    rng = np.random.default_rng(7)
+    holds = 0
+    for _ in range(1000):
+        won = rng.binomial(6, rng.beta(1.4, 0.6, 15))
+        found = clustered_rate(won.tolist(), [6] * 15)
+        assert found is not None
+        holds += found.low <= 0.7 <= found.high
+    assert 0.93 <= holds / 1000 <= 0.98

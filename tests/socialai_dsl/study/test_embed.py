@@ -14,8 +14,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.study.data import study_data
 from socialai_dsl.study.live import Live
+from socialai_dsl.study.replay import study_data
 from socialai_dsl.study.words import words_of
 from socialai_dsl.web.pages import origin_of
 from tests.socialai_dsl.study.participants import ALONE, Taking, loaded_study, newcomer, run, until

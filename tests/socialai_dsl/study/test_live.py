@@ -14,9 +14,11 @@ import pytest
 
 from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.study import log
-from socialai_dsl.study.data import COLUMNS, StudyData, study_data, write_data
+from socialai_dsl.study.columns import COLUMNS
+from socialai_dsl.study.data import write_data
 from socialai_dsl.study.live import FAST, TAKEN, Live
 from socialai_dsl.study.log import FILE, read_log
+from socialai_dsl.study.replay import StudyData, study_data
 from socialai_dsl.study.status import status_of
 from tests.socialai_dsl.study.participants import (
     ALONE,

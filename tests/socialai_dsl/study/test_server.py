@@ -20,8 +20,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.study.data import study_data
 from socialai_dsl.study.rehearsal import rehearse
+from socialai_dsl.study.replay import study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.web.pages import Address
 from tests.socialai_dsl.study.participants import ALONE, TOGETHER, loaded_study, run
