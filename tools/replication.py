@@ -101,7 +101,7 @@ def _rows(measured: Sequence[_Measured]) -> Iterator[str]:
 
 
 def _cells(one: _Measured, compared: dict[str, Any] | None) -> list[str]:
-    from socialai_dsl.reporting.page import difference, figure, p_value, spread
+    from socialai_dsl.reporting.written import difference, figure, p_value, spread
 
     cells = [
         f"... on `{one.test}`" if one.test else one.condition,
