@@ -123,7 +123,16 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "study.replay": (
         TEXT_SIDE
-        | {"errors", "episodes", "traces", "study.columns", "study.log", "study.progress", "study.arena"},
+        | {
+            "errors",
+            "envs",
+            "episodes",
+            "traces",
+            "study.columns",
+            "study.log",
+            "study.progress",
+            "study.arena",
+        },
         set(),
     ),
     "study": (

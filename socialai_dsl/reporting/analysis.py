@@ -283,13 +283,14 @@ def _comparison(first: Summary, second: Summary) -> dict[str, Any]:
 
 
 def pair_by_room(first: Summary, second: Summary) -> dict[str, Any] | None:
-    """Compare two conditions in the test episodes that both list; None without such.
+    """Compare two conditions in the test episodes that both list, on the same seat; None without such.
 
     The same number is the same room only in the same program.
     """
     runs: list[RunRecord] = [*first.condition.done, *second.condition.done]
+    played = {(run.result.program_sha256, run.result.seat) for run in runs if run.result is not None}
     rooms = pd.concat([first.condition.rooms, second.condition.rooms], axis=1, join="inner")
-    if len({run.result.program_sha256 for run in runs if run.result is not None}) != 1 or rooms.empty:
+    if len(played) != 1 or rooms.empty:
         return None
     here, there = rooms.iloc[:, 0], rooms.iloc[:, 1]
     difference = paired_difference(here, there)

@@ -72,27 +72,13 @@ class Mind:
         self.episodes = _together(runs, "episodes", NO_EPISODES)
         self.answers = _together(runs, "answers", NO_ANSWERS)
         self.reactions = _together(runs, "reactions", NO_REACTIONS)
-        learned = self.kind in ("network", "") and len(runs) > 1
-        sessions = learned or self.episodes.trial.max() > 1
-        keeps = self.kind not in (
-            "script",
-            "chance",
-            "rival",
-        )  # which remember nothing, whatever they are granted
-        self.of = (
-            "seeds"
-            if learned
-            else "people"
-            if condition.study
-            else "sessions"
-            if sessions and keeps
-            else "episodes"
-        )
-        if learned:
-            self.episodes["cluster"] = self.episodes.run.astype(str)
-        elif not condition.study:
-            part = self.episodes.cluster if self.of == "sessions" else self.episodes.episode
-            self.episodes["cluster"] = self.episodes.run.astype(str) + " " + part.astype(str)
+        self.of = _come_in(self.kind, len(runs), int(self.episodes.trial.max()) if len(self.episodes) else 1)
+        if not condition.study:  # else the lists say who played together
+            place = self.episodes.run.astype(str)
+            within = {"sessions": "cluster", "episodes": "episode"}.get(self.of)
+            self.episodes["cluster"] = (
+                place if within is None else place + " " + self.episodes[within].astype(str)
+            )
 
     @property
     def trials(self) -> list[int]:
@@ -165,6 +151,16 @@ class Mind:
             yield {"trial": None, **_quartiles(self.reactions.ms)}
             for trial, some in self.reactions.groupby("trial"):
                 yield {"trial": int(trial), **_quartiles(some.ms)}
+
+
+def _come_in(kind: str, runs: int, trials: int) -> str:
+    """What the episodes of a kind of mind come in, see `Mind.of`."""
+    if kind == "person":
+        return "people"
+    if kind in ("network", "") and runs > 1:
+        return "seeds"
+    # Scripts, rivals and chance remember nothing, whatever they are granted.
+    return "episodes" if trials == 1 or kind in ("script", "rival", "chance") else "sessions"
 
 
 def _together(runs: Sequence[RunRecord], name: str, nothing: pd.DataFrame) -> pd.DataFrame:

@@ -131,7 +131,7 @@ def _conditions(study: _Study, experiment: Experiment, several: bool) -> tuple[l
             else "episodes have not ended, and do"
         )
         remarks.append(f"study {study.name}: {study.data.unended} {have} not count")
-    return found, remarks
+    return found, list(dict.fromkeys(remarks))
 
 
 def _programs(condition: Condition) -> set[str]:

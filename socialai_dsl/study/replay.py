@@ -13,9 +13,11 @@ from statistics import median
 from typing import Any
 
 from socialai_dsl.checking.briefing import Tell
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, scripts_agent
+from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.asking import Asking
 from socialai_dsl.errors import UnreadableError, UsageError
+from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
@@ -55,7 +57,7 @@ class PlayedBlock:
 
     Attributes:
         name: of the block. scenario: a name that can be loaded from anywhere. shown: what people call that.
-        program: SHA-256 of what was compiled from it. briefing: what players were told, as results record it.
+        program: SHA-256 of what it is compiled to. briefing: what players were told, as results record it.
         view, feedback: as of the block. endings: the ways that an episode can end.
     """
 
@@ -110,6 +112,7 @@ class _Tables:
             number: Arena(one, tell_of(loaded, number), loaded.study.language)
             for number, one in loaded.played.items()
         }
+        self._names = {number: name for number, name, _ in loaded.named()}
         self._progress = Progress(loaded)
         self._rows: dict[str, list[Row]] = {name: [] for name in COLUMNS}
         self._going: dict[str, _Going] = {}
@@ -141,16 +144,19 @@ class _Tables:
         return {column: simulated if column == "simulated" else row[column] for column in columns}
 
     def _block(self, number: int) -> PlayedBlock:
-        block, arena, loaded = self._loaded.study.blocks[number], self._arenas[number], self._loaded
+        block, name = self._loaded.study.blocks[number], self._names[number]
+        # Where a script may stand in for the agent, what is played has a frame for it, and is the same otherwise.
+        meant = load(name) if scripts_agent(block) else self._loaded.played[number]
+        program = compiled(meant)
         return PlayedBlock(
-            block_name(loaded, number),
-            {place: name for place, name, _ in loaded.named()}[number],
-            loaded.played[number].name,
-            arena.program.sha256,
-            arena.briefing.record(),
+            block_name(self._loaded, number),
+            name,
+            meant.name,
+            program.sha256,
+            self._arenas[number].briefing.record(),
             block.view,
             block.feedback,
-            endings_of(loaded.played[number], arena.program),
+            endings_of(meant, program),
         )
 
     def _take(self, event: Event) -> None:

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from socialai_dsl.reporting.analysis import Analysis, analyse
 from socialai_dsl.reporting.collect import read_experiment
 from socialai_dsl.reporting.page import render_page
 from socialai_dsl.reporting.plots import figures
+from socialai_dsl.reporting.records import QuestionRecord, StudyRecord
 from socialai_dsl.reporting.style import saved
 from socialai_dsl.reporting.tables import tables
 from tests.socialai_dsl.reporting.page_reader import Page
@@ -157,6 +159,38 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     assert not any(name.startswith("on") for _, attributes in page.tags for name in attributes)
     assert " ".join(HOSTILE.split()) in page.text
     assert not any(b"<script" in svg for svg in drawings.values())
+
+
+def test_hostile_texts_of_a_study_stay_text(tmp_path: Path) -> None:
+    write_experiment(tmp_path, [condition("Help / PPO", [0.4])])
+    asked = {"block": HOSTILE, "name": HOSTILE, "ask": HOSTILE}
+    scale = QuestionRecord(
+        kind="scale", start=1, to=5, ends=(HOSTILE, HOSTILE), answers={HOSTILE: 3}, **asked
+    )
+    choice = QuestionRecord(kind="choice", options=(HOSTILE, "b"), answers={"p": HOSTILE}, **asked)
+    text = QuestionRecord(kind="text", answers={"p": f"{HOSTILE} in my own words"}, **asked)
+    study = StudyRecord(
+        name=HOSTILE,
+        simulated=False,
+        joined=2,
+        counted=1,
+        excluded={HOSTILE: 1},
+        unended=0,
+        questions=[scale, choice, text],
+    )
+    analysis = analyse(replace(read_experiment(tmp_path), studies=(study,)), {})
+    shown = render_page(analysis, {}, "1", tmp_path)
+    page = Page(shown)
+    assert "<script" not in shown
+    assert not any(name.startswith("on") for _, attributes in page.tags for name in attributes)
+    assert " ".join(HOSTILE.split()) in page.text
+    assert [row[2:] for row in page.table("share, or mean ± sd")] == [
+        ["3.00", "1"],
+        ["1.00", "1 of 1"],
+        ["0.00", "0 of 1"],
+    ]
+    assert "in my own words" not in page.text
+    assert "simulated" not in page.text.lower()
 
 
 def test_tables_for_other_programs(analysis: Analysis) -> None:

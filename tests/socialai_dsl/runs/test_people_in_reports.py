@@ -234,6 +234,47 @@ def test_a_rehearsal_says_that_it_is_one_in_its_log_and_its_data(
         Live(load_study(place / "asking.yaml"), place / "asking_rehearsal")
 
 
+TOGETHER = """\
+study: together
+consent: I agree.
+blocks:
+- scenario: together/help_together
+  episodes: 3
+  seats: {agent: person, jill: person}
+  wait: 3600
+  act_within: 3600
+  away: 600
+"""
+
+
+def test_two_people_in_one_room_stand_beside_those_who_play_both_seats(tmp_path: Path) -> None:
+    """Whoever plays together is one cluster; a script that may stand in makes no other scenario of it."""
+    from socialai_dsl.study.rehearsal import rehearse
+
+    (tmp_path / "together.yaml").write_text(TOGETHER, encoding="utf-8")
+    (tmp_path / "log").mkdir()
+    rehearse(
+        load_study(tmp_path / "together.yaml"), tmp_path / "log", 4, speed=100, kinds=("script", "random")
+    )
+    script = sd.evaluate("oracle", "together/help_together", 3, out=tmp_path / "oracle", record=0)
+    assert script.folder is not None
+    out = tmp_path / "report"
+    assert (
+        main(["report", str(tmp_path / "log"), str(script.folder), "--no-baselines", "--out", str(out)]) == 0
+    )
+    people = [row for row in rows(out / "minds.csv") if row["kind"] == "person"]
+    assert {row["condition"].partition(" / ")[2] for row in people} == {
+        "simulated people (jill by a person)",
+        "simulated people (as jill, agent by a person)",
+    }
+    assert {(row["episodes"], row["clusters"]) for row in people} == {("6", "2")}
+    assert len({row["program_sha256"] for row in rows(out / "minds.csv")}) == 1
+    (pair,) = rows(out / "rooms.csv")
+    assert "oracle" in pair["first"]
+    assert "(jill by a person)" in pair["second"], "those on the same seat"
+    assert pair["rooms"] == "3"
+
+
 # -- what is wrong with a study ----------------------------------------------------------------------------------------
 
 
