@@ -86,6 +86,15 @@ class Summary:
         told = {name for name, ending in self.endings.items() if ending.success}
         return frozenset(told | (guessed - self.endings.keys()))
 
+    def carried(self, test: str) -> pd.Series:
+        """Of each seed the success on a further test, in proportion to that on its own test episodes."""
+        both = [
+            (run.tests[test].success_rate, run.figures.success_rate)
+            for run in self.condition.done
+            if test in run.tests and run.figures is not None
+        ]
+        return pd.Series([there / own for there, own in both if own > 0], dtype=float)
+
     @property
     def areas(self) -> pd.Series:
         """Of each seed the area under its curve, divided by its frames."""

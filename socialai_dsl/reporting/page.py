@@ -227,6 +227,7 @@ def _section(
         "probes": [row for summary in section.summaries for row in _probes(summary)],
         "tests": sum(one["p"] is not None for one in section.comparisons),
         "comparisons": [_comparison(one) for one in section.comparisons],
+        "carried": [row for summary in section.summaries for row in _carried(summary)],
         "rooms": [_pairing(one) for one in section.rooms],
         "players": players_rows(section),
         "minds": minds_parts(anchor, section, humans, drawings),
@@ -261,6 +262,19 @@ def _published(one: Mapping[str, Any]) -> dict[str, str]:
         "p": p_value(one["p"]),
         "p corrected": p_value(one["p_bonferroni"]),
     }
+
+
+def _carried(summary: Summary) -> Iterator[dict[str, str]]:
+    """What is left of an agent's success on tests that it was not trained for."""
+    for test, there in summary.tests.items():
+        if len(there):
+            yield {
+                "condition": summary.name,
+                "test": scenario_name(test),
+                "own test episodes": spread(summary.success),
+                "there": spread(there),
+                "carried over": spread(summary.carried(test)),
+            }
 
 
 def _probes(summary: Summary) -> Iterator[dict[str, Any]]:

@@ -26,6 +26,7 @@ def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
         "conditions": [_condition(summary) for summary in analysis.summaries],
         "published": [one for section in sections for one in section.published],
         "comparisons": [one for section in sections for one in section.comparisons],
+        "carried": [_carried(summary, test) for summary in analysis.summaries for test in summary.tests],
         "rooms": [one for section in sections for one in section.rooms],
         "outcomes": [row for condition in conditions for row in _outcomes(condition)],
         "results_by": [row for condition in conditions for row in _results_by(condition)],
@@ -59,6 +60,20 @@ def _place(condition: Condition) -> dict[str, Any]:
     entry = condition.entry
     named = {name: getattr(entry, name) for name in ("group", "row", "column", "scenario", "agent")}
     return {"condition": entry.name, **named}
+
+
+def _carried(summary: Summary, test: str) -> dict[str, Any]:
+    there, carried = summary.tests[test], summary.carried(test)
+    return {
+        **_place(summary.condition),
+        "test": test,
+        "seeds_done": len(there),
+        "success_mean": summary.success.mean() if len(summary.success) else None,
+        "test_mean": there.mean() if len(there) else None,
+        "test_std": there.std() if len(there) > 1 else None,
+        "carried_mean": carried.mean() if len(carried) else None,
+        "carried_std": carried.std() if len(carried) > 1 else None,
+    }
 
 
 def _run(condition: Condition, run: RunRecord) -> dict[str, Any]:

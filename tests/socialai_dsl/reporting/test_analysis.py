@@ -8,6 +8,7 @@ import pytest
 
 from socialai_dsl.reporting.analysis import THRESHOLDS, Analysis, analyse
 from socialai_dsl.reporting.collect import read_experiment
+from socialai_dsl.reporting.tables import tables
 from tests.socialai_dsl.reporting.synthetic import (
     condition,
     write_experiment,
@@ -113,8 +114,13 @@ def test_further_tests_are_spread_over_the_seeds_that_have_them(tmp_path: Path) 
     folder = write_experiment(tmp_path, [condition("Help / PPO", [0.9, 0.9, 0.9], tests=["other"])])
     for seed, rate in ((0, 0.1), (2, 0.3)):
         write_tests(folder / "runs" / f"c0-s{seed}", {"other": rate})
-    (summary,) = analyse(read_experiment(folder), {}).summaries
+    analysis = analyse(read_experiment(folder), {})
+    (summary,) = analysis.summaries
     assert list(summary.tests["other"]) == [0.1, 0.3]
+    assert list(summary.carried("other")) == pytest.approx([0.1 / 0.9, 0.3 / 0.9])
+    row = tables(analysis)["carried"].iloc[0]
+    assert (row.condition, row.test, row.seeds_done) == ("Help / PPO", "other", 2)
+    assert row.carried_mean == pytest.approx(0.2 / 0.9)
 
 
 def test_too_short(tmp_path: Path) -> None:

@@ -199,9 +199,9 @@ def test_tables_for_other_programs(analysis: Analysis) -> None:
         for name, table in tables(analysis).items()
     }
     assert {name: len(rows) for name, rows in found.items()} == {
-        "runs": 7, "conditions": 3, "published": 2, "comparisons": 1, "rooms": 0, "outcomes": 21, "results_by": 0,
-        "seats": 0, "crossplay": 0, "words": 0, "minds": 0, "trials": 0, "people": 0, "asked": 0, "orders": 0,
-        "exchanges": 0, "times": 0, "answers": 0, "free_text": 0, "humans": 0,
+        "runs": 7, "conditions": 3, "published": 2, "comparisons": 1, "carried": 1, "rooms": 0, "outcomes": 21,
+        "results_by": 0, "seats": 0, "crossplay": 0, "words": 0, "minds": 0, "trials": 0, "people": 0, "asked": 0,
+        "orders": 0, "exchanges": 0, "times": 0, "answers": 0, "free_text": 0, "humans": 0,
     }  # fmt: skip
     first = found["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)
