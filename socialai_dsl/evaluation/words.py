@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.seats import SCRIPT
+from socialai_dsl.envs.table import HeardLines
 from socialai_dsl.episodes.partners import Partners, own_seat
 from socialai_dsl.episodes.play import Observer, Rooms, Seat, Step
 from socialai_dsl.episodes.players import Player
@@ -24,7 +25,8 @@ from socialai_dsl.frontend import Loaded
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import seats_of
 from socialai_dsl.traces.endings import short_name
-from socialai_dsl.traces.state import cast_of, leaves, names_of
+from socialai_dsl.traces.state import cast_of, leaves
+from socialai_dsl.traces.steps import heard_line
 from socialai_dsl.vocabulary import spelt
 
 SILENCE: Final = "(nothing)"
@@ -146,7 +148,7 @@ def words_of(player: Player, partners: Partners, scenario: str, loaded: Loaded, 
             raise UsageError(f"got {one.agent!r}, expected random, oracle (the script) or a trained agent")
     program = compiled(loaded)
     assert isinstance(program, Program), "internal: it is no suite"
-    listening, own = _Listening(loaded, program, episodes), own_seat(partners, program)
+    listening, own = _Listening(program, episodes), own_seat(partners, program)
     watched = [listening]
     played = play_test_set(player, scenario, loaded, program, episodes, partners=partners, observers=watched)
     called = {seat: _called(played.partners.get(seat, player)) for seat in seats_of(program)}
@@ -165,33 +167,32 @@ class _Listening(Observer):
         like: of each episode what everything was like before each step, by name. draws: the names of draws.
     """
 
-    def __init__(self, loaded: LoadedScenario, program: Program, episodes: int) -> None:
-        self._checked, self._program = loaded.checked, program
+    def __init__(self, program: Program, episodes: int) -> None:
+        self._program = program
+        self._entities = [str(entity) for entity in program.entities]
         self.said: dict[Seat, list[list[tuple[int, str, tuple[str, ...]]]]] = {
             seat: [[] for _ in range(episodes)] for seat in seats_of(program)
         }
         self.like: list[list[dict[Name, Value]]] = [[] for _ in range(episodes)]
         self.draws: set[Name] = set()
-        self._names: dict[int, dict[str, str]] = {}
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
         for room in np.flatnonzero(begun).tolist():
             described = rooms.env.describe(room * len(rooms.names))
             number = int(rooms.numbers[room])
-            self._names[number] = names_of(self._checked, described)
             self.like[number].append(self._situation(described))
 
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
-        heard = rooms.env.utterances() if len(rooms.seats) < len(rooms.names) else []
+        heard = rooms.env.heard_lines() if len(rooms.seats) < len(rooms.names) else None
         for room in np.flatnonzero(step.running).tolist():
             number = int(step.numbers[room])
             now = len(self.like[number]) - 1
             for seat, actions in step.actions.items():
                 if actions[room, 1]:
                     self.said[seat][number].append((now, *self._spoken(actions[room])))
-            for seat, text in self._overheard(rooms, room, number, heard):
+            for seat, text in self._overheard(rooms, room, heard):
                 self.said[seat][number].append((now, text, (text,)))
             if not step.ended[room]:
                 self.like[number].append(self._situation(rooms.env.describe(room * len(rooms.names))))
@@ -207,19 +208,16 @@ class _Listening(Observer):
         ]
         return sentences.text(template, choices), (frame, *parts)
 
-    def _overheard(
-        self, rooms: Rooms, room: int, number: int, heard: Sequence[str]
-    ) -> Iterator[tuple[Seat, str]]:
+    def _overheard(self, rooms: Rooms, room: int, heard: HeardLines | None) -> Iterator[tuple[Seat, str]]:
         """What those say who follow their scripts by themselves, as others hear it."""
-        if not heard:
+        if heard is None:
             return
-        rows = heard[room * len(rooms.names) : (room + 1) * len(rooms.names)]
+        rows = slice(room * len(rooms.names), (room + 1) * len(rooms.names))
         for seat in rooms.names:
             if seat not in rooms.seats:
-                begin = f"{self._names[number][seat]}: "
-                others = [row for name, row in zip(rooms.names, rows, strict=True) if name != seat]
-                lines = {line for row in others for line in row.split("\n") if line.startswith(begin)}
-                yield from ((seat, line.removeprefix(begin)) for line in sorted(lines))
+                own = heard.lines[rows][heard.speakers[rows] == self._entities.index(seat)]
+                texts = {heard_line(0, rooms.env.lines[line]).text for line in own.tolist()}
+                yield from ((seat, text) for text in sorted(texts))
 
     def _situation(self, described: dict[str, Any]) -> dict[Name, Value]:
         """Draws, and the looks and states of things, by name; of draws that are things also their colours."""

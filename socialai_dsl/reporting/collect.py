@@ -220,7 +220,9 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     for folder in folders:
         settings = _settings(folder, [])
         if settings is None or not isinstance(settings.get("scenario"), str):
-            raise ValueError(f"{folder}: expected the folder of a run, with its {CONFIG}, or of cross-play")
+            raise ValueError(
+                f"{folder}: expected the folder of a run, with its {CONFIG}, of a study, with its log, or of cross-play"
+            )
         seed = settings.get("seed")
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
