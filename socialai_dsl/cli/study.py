@@ -17,6 +17,8 @@ from socialai_dsl.study import FIRST_PORT, FOLDER
 
 SUMMARY: Final = "let people take part in a study in the browser, and make tables of what they did"
 
+SIMULATED: Final = "; all of them simulated, in a rehearsal"
+
 EXAMPLES: Final = (
     ("socialai study rehearse asking.yaml", "simulated participants, in a minute"),
     ("socialai study run asking.yaml --links 2", "serve it, with links for two people"),
@@ -157,7 +159,7 @@ def _status(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
     came = (
         f"{status.joined} came, {status.declined} declined, {status.began} began, {status.finished} finished"
     )
-    print(f"{loaded.study.study}: {came}")
+    print(f"{loaded.study.study}: {came}{SIMULATED if status.simulated else ''}")
     for number, (began, finished) in enumerate(status.groups, start=1):
         order = " ".join(str(block + 1) for block in loaded.design.orders[number - 1])
         print(f"  group {number} (blocks {order}): {began} began, {finished} finished")
@@ -177,7 +179,8 @@ def _data(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
     data = study_data(loaded, folder)
     written = write_data(data, loaded, arguments.to or folder / "data", arguments.parquet)
     unended = f", {data.unended} more have not ended" if data.unended else ""
-    print(f"{data.replayed} episodes played again, each came out as it did{unended}")
+    simulated = SIMULATED if data.simulated else ""
+    print(f"{data.replayed} episodes played again, each came out as it did{unended}{simulated}")
     for file in written:
         print(f"  {file}")
     return Exit.GOOD

@@ -56,7 +56,7 @@ class PlayedBlock:
     """What was played in a block.
 
     Attributes:
-        name: of the block. scenario: a name that can be loaded from anywhere. shown: what people call that.
+        name: of the block. scenario: a name that can be loaded from here. shown: what people call that.
         program: SHA-256 of what it is compiled to. briefing: what players were told, as results record it.
         view, feedback: as of the block. endings: the ways that an episode can end.
     """
@@ -150,7 +150,7 @@ class _Tables:
         program = compiled(meant)
         return PlayedBlock(
             block_name(self._loaded, number),
-            name,
+            display_name(Path(name)) if os.path.isabs(name) else name,
             meant.name,
             program.sha256,
             self._arenas[number].briefing.record(),

@@ -19,6 +19,7 @@ class Status:
         joined, declined, began, finished: participants. groups: of each group those who began, and those who finished.
         stages: what those do who have begun and not finished -> how many. won: successful episodes that count.
         pay: what those who finished get, in all; None where nothing is paid.
+        simulated: whether it is a rehearsal.
         latest: the time of the last event.
     """
 
@@ -31,6 +32,7 @@ class Status:
     won: int
     pay: float | None
     latest: str
+    simulated: bool = False
 
 
 def status_of(loaded: LoadedStudy, folder: Path) -> Status:
@@ -39,10 +41,11 @@ def status_of(loaded: LoadedStudy, folder: Path) -> Status:
     Raises:
         OSError, UnreadableError: its log cannot be read.
     """
-    progress, latest = Progress(loaded), ""
+    progress, latest, simulated = Progress(loaded), "", False
     for event in read_log(folder / FILE):
         progress.apply(event)
         latest = event["time"]
+        simulated = simulated or (event["event"] == "study" and bool(event.get("simulated")))
     people = list(progress.people.values())
     began = [person for person in people if person.group is not None]
     finished = [person for person in began if person.ended is not None]
@@ -59,7 +62,8 @@ def status_of(loaded: LoadedStudy, folder: Path) -> Status:
     paid = None if pay is None else sum(pay.base + progress.bonus(person) for person in finished)
     declined = sum(person.declined for person in people)
     won = sum(person.won for person in people)
-    return Status(len(people), declined, len(began), len(finished), groups, dict(stages), won, paid, latest)
+    counts = len(people), declined, len(began), len(finished)
+    return Status(*counts, groups, dict(stages), won, paid, latest, simulated)
 
 
 def _played(stage: str, number: int) -> str:

@@ -258,7 +258,7 @@ def test_the_page_tells_who_played_and_what_was_learnt_within_a_session(tmp_path
     for seed, first in ((0, 0.0), (1, 1.0)):
         path = tmp_path / "runs" / f"c0-s{seed}" / "result.json"
         result = json.loads(path.read_text(encoding="utf-8"))
-        result |= {"kind": "model", "tell": "goal", "told": {"one": "Find out."}, "trials": 2}
+        result |= {"kind": "model", "tell": "goal", "told": {"one": "Find out."}, "trials": 2, "history": 3}
         trials = [{"episodes": 10, "success_rate": rate} for rate in (first, 0.6)]
         result["eval"]["trials"] = trials[: 2 - seed]
         path.write_text(json.dumps(result), encoding="utf-8")
@@ -267,6 +267,7 @@ def test_the_page_tells_who_played_and_what_was_learnt_within_a_session(tmp_path
     assert (players[1], players[3], players[4]) == ("model", "its seat's view", "2 episodes")
     assert "goal" in players[2]
     assert "one: Find out." in page.text
+    assert "a request has the last 3 observations" in page.text
     rows = page.table("trial")
     assert ["Asked / model", "1", "20", "0.500"] in rows
     assert ["Asked / model", "2", "10", "0.600"] in rows

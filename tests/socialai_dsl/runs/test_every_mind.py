@@ -86,6 +86,8 @@ def test_every_kind_of_mind_has_one_form_of_result(folders: dict[str, Path]) -> 
     common = set.intersection(*(set(result["eval"]) for result in results.values()))
     assert {"episodes", "success_rate", "success_interval", "mean_length", "outcomes", "endings"} <= common
     assert {(r["eval"]["episodes"], r["view"]) for r in results.values()} == {(EPISODES, "seat")}
+    told = {kind for kind, result in results.items() if result["feedback"] == "outcome"}
+    assert told == {"person"}, "a model is told how an episode ended where another one follows"
 
 
 def test_every_kind_of_mind_lists_films_and_replays_its_episodes(folders: dict[str, Path]) -> None:

@@ -220,12 +220,15 @@ def test_the_page_has_all_minds_side_by_side_and_says_that_people_are_simulated(
 
 
 def test_a_rehearsal_says_that_it_is_one_in_its_log_and_its_data(
-    place: Path, data: dict[str, list[Row]]
+    place: Path, data: dict[str, list[Row]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     first = json.loads((place / "asking_rehearsal" / "log.jsonl").read_text(encoding="utf-8").split("\n")[0])
     assert (first["simulated"], first["file"]) == (True, "../asking.yaml")
     assert {row["simulated"] for table in data.values() for row in table} == {"True"}
     assert "Simulated" in (place / "data" / "codebook.md").read_text(encoding="utf-8")
+    study, log = str(place / "asking.yaml"), str(place / "asking_rehearsal")
+    assert main(["study", "status", study, "--out", log]) == 0
+    assert "5 began, 4 finished; all of them simulated, in a rehearsal" in capsys.readouterr().out
     from socialai_dsl.study.live import Live
 
     with pytest.raises(
