@@ -42,6 +42,12 @@ def keys_misspelt(text: str) -> Iterator[Site]:
         for line in re.findall(r"\b(?:slots|let|set|with):(.*)", text)
         for name in re.findall(r"\b([a-z_]+):", line)
     }
+    below = re.findall(r"^( +)(?:let|define|slots|beliefs):.*\n((?:\1 .*\n|\n)*)", text, re.MULTILINE)
+    names |= {
+        name
+        for indent, block in below
+        for name in re.findall(rf"^{indent}  ([a-z_]+)\b", block, re.MULTILINE)
+    }
     for found in re.finditer(r"(?:^ *(?:- )?|[{,] *)([a-z_]+):(?= |$)", text, re.MULTILINE):
         # A parameter, a value or a table may be called like a key.
         if found[1] in KEYS - names and f"${found[1]}" not in text:
