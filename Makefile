@@ -15,7 +15,7 @@ SECONDS_EACH ?= 60
 # The tests start hundreds of processes, each of which would compile all of our modules.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference replication update-goldens clean
+.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets gallery picture reference replication update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -103,9 +103,17 @@ reference: $(STAMP) ## write every key and word of the language, docs/reference.
 replication: $(STAMP) ## write the tables of docs/replication.md from the runs that are kept beside it
 	$(BIN)/python -m tools.replication --out docs/replication.md
 
-docs: $(STAMP) ## build the pages of docs/ as a site, in build/site
+gallery: $(STAMP) ## write the gallery of the shipped scenarios, docs/gallery.md, and its pictures
+	$(BIN)/python -m tools.gallery $(ARGS)
+
+picture: $(STAMP) ## draw the picture of the README, one room as each mind gets it, with Chromium
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[pages,studio]'
+	$(BIN)/python -m tools.minds_picture $(ARGS)
+
+docs: $(STAMP) ## build the pages of docs/ as a site, in build/site, with an episode of each scenario to watch
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'
 	$(BIN)/python -m sphinx -q -W -n --keep-going docs build/site
+	$(BIN)/python -m tools.gallery --replays build/site/replays
 
 update-goldens: $(STAMP) ## rewrite the golden files; review the diff before committing it
 	$(BIN)/python -m pytest --update-goldens $(ARGS)

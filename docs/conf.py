@@ -4,7 +4,7 @@ project = "socialai-dsl"
 author = "socialai-dsl contributors"
 copyright = author
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline"]
 # Pages link to files of the project, which are no pages of the site: they are offered for download.
@@ -17,7 +17,14 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
 
+# Of a console only what is typed is copied.
+copybutton_prompt_text = "$ "
+copybutton_line_continuation_character = "\\"
+
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_favicon = "_static/favicon.svg"
 html_title = "socialai-dsl"
 exclude_patterns = ["_build", "results"]
 nitpicky = True

@@ -10,7 +10,7 @@ from socialai_dsl.atomic import read_json, write_json, write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
 from socialai_dsl.errors import UsageError
-from socialai_dsl.loader.shipped import catalogue, shipped_scenarios, variants_of
+from socialai_dsl.loader.shipped import catalogue, shipped_scenarios
 
 if TYPE_CHECKING:
     import numpy as np
@@ -86,7 +86,7 @@ def stale_files(names: list[str], folder: Path) -> list[Path]:
         for file, text in _pages(names, folder).items()
         if not (folder / file).is_file() or (folder / file).read_text(encoding="utf-8") != text
     ]
-    return stale + [file for file, drawn in _pictures(names, folder).items() if not _alike(file, drawn)]
+    return stale + [file for file, drawn in _pictures(names, folder).items() if not alike(file, drawn)]
 
 
 def _pages(names: list[str], folder: Path) -> dict[str, str]:
@@ -107,7 +107,7 @@ def _write(names: list[str], folder: Path) -> None:
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / file, text)
     for place, drawn in _pictures(names, folder).items():
-        if not _alike(place, drawn):
+        if not alike(place, drawn):
             Image.fromarray(drawn).save(place, optimize=True)
 
 
@@ -134,6 +134,7 @@ def _measure(names: list[str], folder: Path) -> None:
 
 def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any]:
     """Figures of the random policy and, where there is one, of the scenario's own script."""
+    from socialai_dsl.episodes.scripts import script_of
     from socialai_dsl.evaluation.chance import play_at_random
     from socialai_dsl.evaluation.scripts import play_script
 
@@ -148,7 +149,7 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
             "mean_reward": sample.mean_reward,
         }
     }
-    if "oracle" in variants_of(name):
+    if script_of(name) is not None:
         report = play_script(name, rooms, seed, _STATES)
         unsolved = {room.index for room in report.unsolved}
         figures["oracle"] = {
@@ -233,7 +234,7 @@ def _load(name: str) -> "Loaded":
     return socialai_dsl.load(name)
 
 
-def _alike(path: Path, drawn: "NDArray[np.uint8]") -> bool:
+def alike(path: Path, drawn: "NDArray[np.uint8]") -> bool:
     """Whether a file shows this picture."""
     import numpy as np
     from PIL import Image
