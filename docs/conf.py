@@ -7,6 +7,10 @@ copyright = author
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline"]
+myst_html_meta = {
+    "description": "Write a social experiment as one page of YAML; people, language models and RL agents play it "
+    "in the same rooms."
+}
 # Pages link to files of the project, which are no pages of the site: they are offered for download.
 suppress_warnings = ["myst.header"]
 

@@ -53,11 +53,11 @@ class Reader:
 
     @staticmethod
     def _save(text: str) -> None:
-        first, _, rest = text.partition("\n")
+        first, _, _ = text.partition("\n")
         name = re.match(r"# (\w+\.yaml)(, at its end)?$", first)
         assert name, f"a file without a name: {first}"
         with open(name[1], "a" if name[2] else "w", encoding="utf-8") as file:
-            file.write(rest)
+            file.write(text)
 
     def _run_python(self, text: str) -> None:
         printed = io.StringIO()
