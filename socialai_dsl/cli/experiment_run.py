@@ -9,7 +9,6 @@ from typing import Any
 
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import status_text
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.episodes.players import require_trainer
@@ -24,7 +23,7 @@ from socialai_dsl.runs.folder import only_writer
 
 def run(arguments: argparse.Namespace) -> Exit:
     """Make the folder, or go on in it, and do the runs that are left."""
-    require_trainer()
+    require_trainer("rich")
     document, folder = requested(arguments.file, arguments.profile, arguments.out)
     if arguments.engine != "ray":
         refuse(arguments, ("address",), "only the engine `ray` has one")
@@ -47,6 +46,8 @@ def work_on(
     Raises:
         KeyboardInterrupt: it was interrupted; all runs are left so that the same command goes on with them.
     """
+    from socialai_dsl.cli.experiment_progress import RunsProgress  # it loads Rich
+
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if as_json else sys.stdout
     with (

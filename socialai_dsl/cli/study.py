@@ -172,6 +172,7 @@ def _status(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
 
 
 def _data(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
+    require_server()  # it plays the study again
     from socialai_dsl.study.data import write_data
     from socialai_dsl.study.replay import study_data
 

@@ -232,14 +232,18 @@ def player_of(agent: Agent, scenario: str) -> Player:
     )
 
 
-def require_trainer() -> None:
+def require_trainer(*more: str) -> None:
     """Say how to install the trainer if it is missing.
 
+    Args:
+        more: what is needed beside the libraries with which a trained agent plays.
+
     Raises:
-        UsageError: it is.
+        UsageError: a library is not installed.
     """
-    if find_spec("torch") is None:
-        raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'")
+    for library in ("torch", "safetensors", *more):
+        if find_spec(library) is None:
+            raise UsageError(f"training and evaluating need {library}: pip install 'socialai-dsl[train]'")
 
 
 def folder_of(agent: str) -> Path:

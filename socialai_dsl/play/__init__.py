@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -46,9 +47,11 @@ def play(
 
     Raises:
         ScenarioError: the scenario has mistakes.
-        UsageError: there is no terminal.
+        UsageError: there is no terminal, or Textual is not installed.
         OSError: the file cannot be written, or is there already.
     """
+    if find_spec("textual") is None:
+        raise UsageError("playing in a terminal needs textual: pip install 'socialai-dsl[play]'")
     _require_terminal()
     from socialai_dsl.play.game import Game
     from socialai_dsl.play.journal import FILE, Journal

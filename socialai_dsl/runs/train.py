@@ -141,7 +141,7 @@ def train(
         KeyboardInterrupt: it was interrupted; the message says how to go on.
         OSError: a file cannot be written.
     """
-    require_trainer()
+    require_trainer("matplotlib", "tensorboard")
     spec = str(scenario)
     asked = str(options.get("agent") or LEARNS)
     agent = LEARNS if asked == LEARNS else named_agent(asked, spec)
@@ -177,7 +177,7 @@ def resume(folder: str | Path, *, progress: Report | None = None, **options: Any
         UsageError: there is no such run, it is none that trains, or it cannot go on with these options.
         ScenarioError, RunFailed, KeyboardInterrupt, OSError: see `train`.
     """
-    require_trainer()
+    require_trainer("matplotlib", "tensorboard")
     run = Run(Path(folder))
     _resumable(run)  # so that no folder is made where there is none
     with only_writer(run.folder):

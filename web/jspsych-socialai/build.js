@@ -15,7 +15,16 @@ const together = {
   },
 };
 const out = process.argv[2] ?? join(own, "dist");
-const all = { entryPoints: [join(own, "src/index.js")], bundle: true, charset: "utf8", loader: { ".css": "text" }, plugins: [together], target: "es2022" };
+const ownAlone = {
+  name: "own alone",
+  setup({ onEnd }) {
+    onEnd(({ metafile }) => {
+      const foreign = Object.keys(metafile.inputs).filter((file) => file.includes("node_modules/"));
+      if (foreign.length) throw new Error(`the banner says that it contains nothing of others, and it contains ${foreign}`);
+    });
+  },
+};
+const all = { entryPoints: [join(own, "src/index.js")], bundle: true, metafile: true, charset: "utf8", loader: { ".css": "text" }, plugins: [together, ownAlone], target: "es2022" };
 const banner = { js: "/* jspsych-socialai, MIT licence, contributors to socialai-dsl. It contains nothing of others. */" };
 await build({ ...all, banner, format: "esm", external: ["jspsych"], outfile: join(out, "index.js") });
 await build({ ...all, banner, format: "cjs", external: ["jspsych"], outfile: join(out, "index.cjs"), footer: { js: "module.exports = module.exports.default;" } });
