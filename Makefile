@@ -15,7 +15,7 @@ SECONDS_EACH ?= 60
 # The tests start hundreds of processes, each of which would compile all of our modules.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets gallery picture reference replication update-goldens clean
+.PHONY: help run test test-all test-pages test-long test-package test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets gallery picture reference replication update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -39,6 +39,9 @@ test-pages: $(STAMP) node_modules/.package-lock.json ## check the scripts of the
 
 test-long: $(STAMP) ## run the tests that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+test-package: $(STAMP) ## build the wheel, and try it and its extras one by one in empty environments; installs them from an index
+	$(BIN)/python -m pytest -m "not learning" tests/test_package.py $(ARGS)
 
 test-learning: $(STAMP) ## train agents on two scenarios for minutes, and require what they have to reach
 	$(BIN)/python -m pytest -m learning tests/test_learning.py $(ARGS)

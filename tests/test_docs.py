@@ -30,7 +30,17 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 TUTORIAL = ROOT / "docs" / "tutorial.md"  # its steps are followed one by one: tests/test_tutorial.py
 INTEROP = ROOT / "docs" / "interop.md"  # it needs other libraries: tests/test_interop.py
-DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
+DOCUMENTS = [
+    ROOT / name
+    for name in (
+        "README.md",
+        "ARCHITECTURE.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
+        "CODE_OF_CONDUCT.md",
+    )
+]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 FINDINGS = ROOT / "docs" / "diagnostics"  # their commands and files are wrong on purpose: tests/diagnostics
 REFERENCE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")

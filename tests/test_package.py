@@ -1,14 +1,20 @@
 """The project's own files: what is locked, what a wheel carries, what the readme promises."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
+from pexpect import EOF, spawn
+
+from tests.socialai_dsl.llm.endpoint import endpoint
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -114,3 +120,151 @@ def test_the_commands_of_a_wheel_need_no_checkout(wheel: Path, tmp_path: Path) -
     assert command("main", "explain", "S101").startswith("# S101")
     random = ["--agent", "random", "--eval-episodes", "2", "--out", "run"]
     assert "2 of the test set" in command("run_main", "cointhief", *random)
+
+
+# -- what others wrote -----------------------------------------------------------------------------------------------
+
+
+def packages_behind(file: Path) -> Iterator[dict[str, str]]:
+    """The entries of package-lock.json for what a script imports, and for what that imports."""
+    lock = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+    found: set[str] = set()
+    wanted = re.findall(r'^import .* from "([^."][^"]*)"', file.read_text(encoding="utf-8"), re.MULTILINE)
+    while wanted:
+        name = wanted.pop()
+        if name not in found:
+            found.add(name)
+            wanted += lock[f"node_modules/{name}"].get("dependencies", {})
+    return ({"name": name, **lock[f"node_modules/{name}"]} for name in sorted(found))
+
+
+UNUSED = {
+    "@codemirror/streamparser",
+    "vscode-jsonrpc",
+    "vscode-languageserver-protocol",
+    "vscode-languageserver-types",
+}
+"""What packages of the editor ask for, of which nothing is in the bundle: they are types, or not called."""
+
+
+def test_notices_name_every_package_in_the_editor() -> None:
+    """`tests/browser/test_bundles.py` compares them with the bundle itself, where there is Node."""
+    notices = (ROOT / "THIRD_PARTY_NOTICES").read_text(encoding="utf-8")
+    named = set(re.findall(r"^-{80}\n\n(\S+ \S+), .+$", notices, re.MULTILINE))
+    behind = {f"{one['name']} {one['version']}" for one in packages_behind(ROOT / "editor" / "editor.js")}
+    assert named <= behind
+    assert {package.rpartition(" ")[0] for package in behind - named} == UNUSED
+    assert len(named) > 10
+    assert notices.count("Permission is hereby granted") >= len(named)
+
+
+# -- what a host reads -------------------------------------------------------------------------------------------------
+
+
+def test_files_for_citing_and_for_a_host_say_the_same_as_the_project() -> None:
+    project = PROJECT["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert [author["name"] for author in citation["authors"]] == [one["name"] for one in project["authors"]]
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    pythons = [entry.split()[-1] for entry in project["classifiers"] if re.search(r":: 3\.\d+$", entry)]
+    assert workflow["jobs"]["test"]["strategy"]["matrix"]["python"] == pythons
+    assert project["requires-python"] == f">={pythons[0]}"
+    container = json.loads((ROOT / ".devcontainer" / "devcontainer.json").read_text(encoding="utf-8"))
+    made = [container["postCreateCommand"], container["postAttachCommand"]]
+    made += [step["run"] for job in workflow["jobs"].values() for step in job["steps"] if "run" in step]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8").replace("$(STAMP):", ".venv/.installed:")
+    for command in made:
+        make, target = command.split()
+        assert make == "make"
+        assert re.search(rf"^{re.escape(target)}:", makefile, re.MULTILINE), target
+
+
+def test_templates_of_issues_ask_for_something() -> None:
+    """The shape that GitHub wants; a field that is asked for has a name of its own."""
+    forms = [
+        path for path in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml") if path.name != "config.yml"
+    ]
+    assert len(forms) == 3
+    for path in forms:
+        form = yaml.safe_load(path.read_text(encoding="utf-8"))
+        assert {"name", "description", "body"} <= form.keys()
+        assert {field["type"] for field in form["body"]} <= {"textarea", "input"}
+        assert len({field["id"] for field in form["body"]}) == len(form["body"])
+        assert all(field["attributes"]["label"] for field in form["body"])
+        assert any(field.get("validations", {}).get("required") for field in form["body"])
+
+
+# -- extras one by one, in environments of their own -----------------------------------------------------------------
+
+STUDY = ROOT / "experiments" / "studies" / "asking.yaml"
+RESULTS = "evaluate oracle --on cointhief --episodes 2 --out results"
+PARALLEL = (
+    "import socialai_dsl as sd; print(sd.make_parallel('together/help_together').reset(seed=1)[0].keys())"
+)
+TRIED = {
+    "": ["socialai validate talkitout", "socialai evaluate random --on cointhief --episodes 2"],
+    "lsp": ["socialai lsp"],  # whose input ends at once
+    "report": [f"socialai {RESULTS}", "socialai report --no-baselines results/cointhief/oracle"],
+    "pettingzoo": [["python", "-c", PARALLEL]],
+    "studio": [f"socialai study rehearse {STUDY} --participants 2 --speed 1000"],
+    "train": ["socialai-run cointhief --frames 512 --eval-episodes 2 --out run"],
+}
+"""Extra -> commands that succeed with it alone."""
+UNCOMPILED = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+"""Each environment would compile the engine anew, which takes longer than all that is tried."""
+
+
+@pytest.fixture
+def environment(wheel: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """The programs of an empty environment with the wheel and one extra, in the versions of the lock."""
+    made = tmp_path / "environment"
+    subprocess.run([sys.executable, "-m", "venv", made], check=True, timeout=120)
+    wanted = f"{wheel}[{request.param}]" if request.param else str(wheel)
+    install = [made / "bin" / "python", "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
+    subprocess.run([*install, "-c", ROOT / "requirements.lock", wanted], check=True, timeout=900)
+    return made / "bin"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(("environment", "commands"), TRIED.items(), indirect=["environment"], ids=[*TRIED])
+def test_an_extra_is_all_that_its_commands_need(
+    environment: Path, commands: list[str | list[str]], tmp_path: Path
+) -> None:
+    for command in commands:
+        program, *words = command if isinstance(command, list) else command.split()
+        ended = subprocess.run(
+            [environment / program, *words],
+            cwd=tmp_path, env=UNCOMPILED, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=280,
+        )  # fmt: skip
+        assert ended.returncode == 0, f"{command}: {ended.stderr}"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("environment", ["llm"], indirect=True)
+def test_llm_is_all_that_a_language_model_needs(environment: Path, tmp_path: Path) -> None:
+    with endpoint(lambda _: "Act: done") as stub:
+        command = f"evaluate llm:stub --base-url {stub.url} --on cointhief --episodes 2".split()
+        ended = subprocess.run(
+            [environment / "socialai", *command],
+            cwd=tmp_path, env=UNCOMPILED, capture_output=True, text=True, timeout=280,
+        )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    assert stub.requests
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("environment", ["play"], indirect=True)
+def test_play_is_all_that_a_player_needs(environment: Path, tmp_path: Path) -> None:
+    screen = spawn(
+        str(environment / "socialai"), ["play", "cointhief"],
+        cwd=str(tmp_path), dimensions=(24, 80), timeout=120, env={**UNCOMPILED, "TERM": "xterm-256color"},
+    )  # fmt: skip
+    screen.expect("in view")
+    screen.send("q")
+    screen.expect(EOF)
+    screen.close()
+    assert screen.exitstatus == 0
