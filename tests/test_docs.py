@@ -113,20 +113,25 @@ def test_readme_scenario_can_be_won(reader: Path) -> None:
     assert info["success"]
 
 
-def test_a_page_names_every_scenario_that_ships() -> None:
-    text = (ROOT / "docs" / "shipped.md").read_text(encoding="utf-8")
-    shipped = {path.stem for path in (ROOT / "scenarios").glob("*.yaml") if not path.stem.endswith(".tests")}
-    parts = {name for name in shipped if name.rsplit("_", 1)[-1] in ("oracle", "coded")}
-    of_any = {name for name in shipped if "\nof: any" in (ROOT / "scenarios" / f"{name}.yaml").read_text()}
-    alone = shipped - parts - of_any
-    named = set(re.findall(r"`([\w?=]+)`", text))
-    assert alone - named == set()
+def test_the_gallery_names_every_file_that_can_be_played_and_every_variant_for_all() -> None:
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    files = [path for path in (ROOT / "scenarios").rglob("*.yaml") if not path.name.endswith(".tests.yaml")]
+    of_any = {
+        path.stem
+        for path in files
+        if path.parent.name == "scenarios" and "\nof: any" in path.read_text("utf-8")
+    }
     assert {"unsocial", "seats"} <= of_any
-    for name in (*of_any, "oracle"):
+    for name in (*of_any, "oracle", "as_coded"):
         assert f"`+{name}`" in text
-    in_folders = [path for path in (ROOT / "scenarios").glob("*/*.yaml") if _can_be_played(path)]
-    assert len(in_folders) > 20
-    assert {path.stem for path in in_folders} - named == set()
+    named = {word.partition("+")[0] for word in re.findall(r"`([\w/+]+)`", text)}
+    played = {
+        path.relative_to(ROOT / "scenarios").with_suffix("").as_posix()
+        for path in files
+        if _can_be_played(path)
+    }
+    assert len(played) > 60
+    assert played - named == set()
 
 
 def _can_be_played(path: Path) -> bool:

@@ -230,7 +230,7 @@ def page() -> str:
         rows = [_row(line, about, measured.get(line.shown, {})) for line in group]
         parts.append("\n".join(["| | |", "|---|---|", *rows]))
     suites = [f"* `{name}`: {about[name]}" for name in SUITES]
-    parts += ["Suites of these problems, with held-out combinations:", "\n".join(suites), _MENU]
+    parts += ["Suites of these problems, with held-out combinations:", "\n".join(suites), _END]
     return "\n\n".join(parts) + "\n"
 
 
@@ -246,12 +246,28 @@ Success in per cent of episodes: **chance** acts at random, the **rival** is the
 [lack the skill](checks.md#rivals), the **script** is the scenario's own, the **agent** was trained after it had
 imitated the script. An agent's figure leads to its conditions, that of chance to the data sheet."""
 
-_MENU: Final = """\
+_END: Final = """\
+## Names and variants
+
+A name includes the folder, `classics/director_task`. Each scenario has a variant `+oracle`, a frame that plays the
+agent: a demonstration that it can be solved. Any of them takes `+unsocial` (the others neither seen nor heard),
+`+marked` (tokens say who speaks), `+seats` (whoever has a frame
+[can be played](partners.md#the-other-side-of-a-scenario)) and `+alike` (so, and no picture tells which of them one
+is). Those of the paper have `+as_coded`, the differences of the code released with the paper;
+`social_env?split=test` has a role that training never had.
+
+The caretaker of the School shows which thing is right in five ways, `school/boxes+pointing`, `+color`, `+feedback`,
+`+emulation` and `+scaffolding`. `school/boxes+alone` has no distractor, `+asocial` no caretaker, `+asocial+alone`
+neither; `doors_alone` and `marbles_alone` are files of their own. The agent takes the other role in
+`school/lever_door_swapped`. `socialai list` has every name with its variants and parameters.
+
+The scenarios of the paper, the classics and those of several players have [data sheets](scenarios/README.md) with
+pictures, skills and figures.
+
 ```{toctree}
 :hidden:
 :glob:
 
-shipped
 classics
 scenarios/README
 scenarios/*
@@ -269,7 +285,7 @@ def _groups() -> Iterator[tuple[str, str, Sequence[Line]]]:
     yield (
         "The SocialAI School",
         "One line for each problem. Where one of two things is right, the caretaker says its colour; without a cue "
-        "nothing tells ([all cues and variants](shipped.md)).",
+        "nothing tells ([the other cues](#names-and-variants)).",
         _SCHOOL,
     )
 
