@@ -156,6 +156,16 @@ AGENTS: Final[dict[str, tuple[str, str]]] = {
 """What is shown -> a trained agent's success as a page states it, and the place there; others are in `agents/`."""
 
 
+RELATIONS: Final = {
+    "novel/reference_game": "1.000",
+    "novel/sarcasm": ".996",
+    "novel/implicature": ".960",
+    "school/color_match": ".956",
+    "novel/conventions": ".602",
+}
+"""What is shown -> success with the network `relations`, as `docs/mastery.md` has it, where it changes the verdict."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
@@ -320,6 +330,8 @@ def _figures(line: Line, measured: Mapping[str, Any]) -> str:
         figure, place = AGENTS[line.shown]
         share = float(figure) / (100 if place.startswith("classics") else 1)
         found.append(f"agent [{_per_cent(share)}]({place})")
+    if line.shown in RELATIONS:
+        found[-1] += f", with [`relations`](agents.md#relations) {_per_cent(float(RELATIONS[line.shown]))}"
     return " · ".join(found)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.loader.shipped import catalogue
-from tools.gallery import AGENTS, DOCS, SUITES, Line, lines, listed, page, pictures, write_replays
+from tools.gallery import AGENTS, DOCS, RELATIONS, SUITES, Line, lines, listed, page, pictures, write_replays
 from tools.sheets import alike
 
 GALLERY = (DOCS / "gallery.md").read_text(encoding="utf-8")
@@ -23,10 +23,15 @@ def test_the_gallery_is_up_to_date() -> None:
     assert [file for file, drawn in pictures().items() if not alike(file, drawn)] == [], "run `make gallery`"
 
 
-@pytest.mark.parametrize("name", AGENTS)
-def test_success_of_agents_is_as_another_page_has_it(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "figure", "place"),
+    [
+        *((name, figure, place) for name, (figure, place) in AGENTS.items()),
+        *((name, figure, AGENTS[name][1]) for name, figure in RELATIONS.items()),
+    ],
+)
+def test_success_of_agents_is_as_another_page_has_it(name: str, figure: str, place: str) -> None:
     """In the row of the scenario, or where the page has it in sentences, in the section."""
-    figure, place = AGENTS[name]
     page_name, _, heading = place.partition("#")
     text = (DOCS / page_name).read_text(encoding="utf-8")
     if page_name == "mastery.md":
