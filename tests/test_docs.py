@@ -202,9 +202,10 @@ def commands(path: Path) -> Iterator[list[str]]:
     """The commands of the package that a document shows."""
     for text in blocks(path, "console"):
         for line in text.replace("\\\n", " ").splitlines():
-            words = shlex.split(line.removeprefix("$ "), comments=True)
-            if line.startswith("$ ") and words[0].startswith("socialai"):
-                yield words
+            if line.startswith("$ "):
+                words = shlex.split(line.removeprefix("$ "), comments=True)
+                if words[0].startswith("socialai"):
+                    yield words
 
 
 def test_commands_in_the_documents_are_understood(
