@@ -42,7 +42,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import display_name, read_document
+from socialai_dsl.loader.reader import display_name, read_document, shipped_folder
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.annotations import held_at
 from socialai_dsl.schema.curriculum import Curriculum
@@ -616,8 +616,10 @@ def _check_played(
     """
     played: dict[str, Loaded] = {}
     for name, written, place in experiment.named():
-        result = check(name, base=experiment.folder)
         span = experiment.resolved.tree.value_span(place)
+        if _is_outside(name, experiment.folder, span, bag):
+            continue
+        result = check(name, base=experiment.folder)
         if not result.has_errors:
             loaded = _loaded(result)
             if loaded is not None:
@@ -630,6 +632,17 @@ def _check_played(
     return played
 
 
+def _is_outside(name: str, folder: Path, span: Span, bag: DiagnosticBag) -> bool:
+    """Report a file that does not ship and lies outside the folder of the file that names it; links are followed."""
+    base = name.partition("?")[0].partition("+")[0]
+    roots = folder.resolve(), shipped_folder().resolve()
+    if not os.path.isabs(base) or any(Path(base).resolve().is_relative_to(root) for root in roots):
+        return False
+    hint = f"files may be taken from {display_name(folder)}, folders in it, and the shipped scenarios"
+    bag.error("S505", f"`{Path(base).name}` lies outside the file's folder", span, hint=hint)
+    return True
+
+
 def _check_study_played(
     study: LoadedStudy, bag: DiagnosticBag, files: dict[str, Source]
 ) -> dict[int, Loaded]:
@@ -637,9 +650,11 @@ def _check_study_played(
     played: dict[int, Loaded] = {}
     results: dict[str, CheckResult] = {}
     for number, name, place in study.named():
+        span = study.resolved.tree.value_span(place)
+        if _is_outside(name, study.folder, span, bag):
+            continue
         known = name in results
         result = results[name] = results.get(name) or check(name, base=study.folder)
-        span = study.resolved.tree.value_span(place)
         loaded = None if result.has_errors else _loaded(result)
         if result.has_errors:
             if not known:
@@ -667,11 +682,13 @@ def _check_study_played(
 def _check_curricula(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]) -> None:
     """Check the files of phases that an experiment names."""
     for path, place in experiment.curricula():
+        span = experiment.resolved.tree.value_span(place)
+        if _is_outside(path, experiment.folder, span, bag):
+            continue
         result = check(path)
         if result.has_errors:
             _add_findings(result, place, experiment.resolved, bag, files)
         elif result.curriculum is None:
-            span = experiment.resolved.tree.value_span(place)
             bag.error("S108", f"this is {_kind_of(result)}; expected a curriculum", span)
 
 

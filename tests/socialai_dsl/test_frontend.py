@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
+from tests.fuzzing.playground import listening
 
 ROOT = Path(__file__).parent.parent.parent
 SHIPPED = sorted(set(ROOT.glob("scenarios/talkitout*.yaml")) - set(ROOT.glob("scenarios/*.tests.yaml")))
@@ -194,3 +196,30 @@ def test_checking_needs_none_of_the_heavy_libraries():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "named", ["../outside/secret.yaml", "linked/secret.yaml", "link.yaml", "{out}/secret.yaml"]
+)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "experiment: e\nconditions: [{{name: a, scenario: {0}, frames: 1000}}]\n",
+        "experiment: e\nconditions: [{{name: a, scenario: help, tests: [{0}], frames: 1000}}]\n",
+        "experiment: e\nconditions: [{{name: a, scenario: help, curriculum: {0}, frames: 1000}}]\n",
+        "study: s\nconsent: I agree.\nblocks: [{{scenario: {0}, episodes: 1}}]\n",
+        "study: s\nconsent: I agree.\npractice: {{scenario: {0}}}\nblocks: [{{scenario: help, episodes: 1}}]\n",
+    ],
+)
+def test_no_file_reads_what_lies_outside_its_folder(named: str, text: str, tmp_path: Path) -> None:
+    own, out = tmp_path / "own", tmp_path / "outside"
+    own.mkdir()
+    out.mkdir()
+    (out / "secret.yaml").write_text("scenario: secret\nabout: The number is 666.\n")
+    (own / "linked").symlink_to(out)
+    (own / "link.yaml").symlink_to(out / "secret.yaml")
+    (own / "f.yaml").write_text(text.format(named.format(out=out)))
+    with listening() as ear:
+        (found,) = check(own / "f.yaml").diagnostics
+    assert (found.code, found.span.file.endswith("f.yaml")) == ("S505", True)
+    assert not [path for path in ear.opened if "secret" in os.path.realpath(path)]
