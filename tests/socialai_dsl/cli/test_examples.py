@@ -18,7 +18,7 @@ EXAMPLES = [command for module in MODULES.values() for command, _ in module.EXAM
 GOES_ON = re.compile(
     r"socialai (play|studio|serve|lsp|study)\b"  # until somebody ends it
     r"|socialai-run talkitout$|experiment run"  # for minutes or hours
-    r"|llm:|experiment status"  # with a model, or the folder of an experiment
+    r"|llm:|experiment status|studies/"  # with a model, or the folder of an experiment or of a study
 )
 """Examples that do not end by themselves, or need what is not here: they are parsed, and not followed."""
 
