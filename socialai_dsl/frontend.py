@@ -42,7 +42,7 @@ from socialai_dsl.diagnostics import (
     did_you_mean,
 )
 from socialai_dsl.loader.comments import comments_of
-from socialai_dsl.loader.reader import display_name, read_document, shipped_folder
+from socialai_dsl.loader.reader import Library, display_name, read_document
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.annotations import held_at
 from socialai_dsl.schema.curriculum import Curriculum
@@ -634,13 +634,15 @@ def _check_played(
 
 def _is_outside(name: str, folder: Path, span: Span, bag: DiagnosticBag) -> bool:
     """Report a file that does not ship and lies outside the folder of the file that names it; links are followed."""
-    base = name.partition("?")[0].partition("+")[0]
-    roots = folder.resolve(), shipped_folder().resolve()
-    if not os.path.isabs(base) or any(Path(base).resolve().is_relative_to(root) for root in roots):
-        return False
-    hint = f"files may be taken from {display_name(folder)}, folders in it, and the shipped scenarios"
-    bag.error("S505", f"`{Path(base).name}` lies outside the file's folder", span, hint=hint)
-    return True
+    base = Path(name.partition("?")[0].partition("+")[0])
+    if not base.is_absolute():
+        return False  # the name of something that ships
+    try:
+        Library([folder]).resolved(base, span)
+    except ScenarioError as error:
+        bag.extend(error.diagnostics)
+        return True
+    return False
 
 
 def _check_study_played(

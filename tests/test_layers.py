@@ -93,7 +93,8 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "episodes": (
         TEXT_SIDE
-        | {"errors", "model_options", "program", "program_suite", "envs", "render", "traces", "runs.folder"},
+        | {"errors", "baselines", "model_options", "program", "program_suite", "envs", "render", "traces"}
+        | {"runs.folder"},
         {"numpy", "gymnasium", "PIL", "trainer", "torch", SHIPPED},
     ),
     "play": (

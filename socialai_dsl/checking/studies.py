@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -179,8 +180,8 @@ class _Check:
 
     def _beside(self, name: str) -> Path | None:
         """A file in the study's folder; None if there is none, or if it lies elsewhere."""
-        file = (self._folder / name).resolve()
-        return file if file.is_relative_to(self._folder.resolve()) and is_file(file) else None
+        file = Path(os.path.realpath(self._folder / name))  # which takes links in a circle, too
+        return file if file.is_relative_to(os.path.realpath(self._folder)) and is_file(file) else None
 
     def questions(self, study: Study) -> None:
         """Report questions that cannot be answered, and names that two of them have."""

@@ -9,16 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.baselines import wilson
 from socialai_dsl.episodes.play import Observer, Rooms, Step
-
-# The two-sided 95 % quantile of the normal distribution.
-_Z = 1.959963984540054
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
-    """The 95 % confidence interval of a success rate (Wilson 1927, the score interval without correction).
-
-    Unlike rate ± 2 standard errors it stays within 0 and 1, and it has a width where all trials had one result.
+    """The 95 % confidence interval of a success rate, see `baselines.wilson`.
 
     Raises:
         ValueError: there was no trial, or there were more successes than trials.
@@ -27,13 +23,7 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
         raise ValueError(
             f"got {successes} successes of {trials} trials, expected 0 to `trials` of at least one"
         )
-    rate, spread = successes / trials, _Z * _Z / trials
-    centre = (rate + spread / 2) / (1 + spread)
-    half = math.sqrt(rate * (1 - rate) * spread + spread * spread / 4) / (1 + spread)
-    # At the ends the formula gives 0 and 1 but for rounding.
-    low = 0.0 if successes == 0 else centre - half
-    high = 1.0 if successes == trials else centre + half
-    return low, high
+    return wilson(successes / trials, trials)
 
 
 def interval_over_rooms(won: NDArray[np.bool_]) -> tuple[float, float]:

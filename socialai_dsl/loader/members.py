@@ -409,7 +409,7 @@ def _split_leaves(
     They have all the values of `only`, not all those of `without`, and none that is held out unless `only` names it.
     """
     chosen = _splits(suite).get(split) if split is not None else None
-    kept, named = tuple(leaves), _held_out(suite)
+    kept, held = tuple(leaves), _held_out(suite)
     for word, has in (("only", True), ("without", False)):
         wanted = _mapping(chosen, word)
         if wanted is None:
@@ -418,8 +418,8 @@ def _split_leaves(
             return tuple(leaves)
         kept = tuple(leaf for leaf in kept if _has(leaf, wanted) is has)
         if has:
-            named = {name: _besides(values, wanted.get(name)) for name, values in named.items()}
-    kept = tuple(leaf for leaf in kept if not _has_some(leaf, named))
+            held = {name: _besides(values, wanted.get(name)) for name, values in held.items()}
+    kept = tuple(leaf for leaf in kept if not _has_some(leaf, held))
     if not kept and leaves:
         message = f"no leaf is in the split `{split}`" if split is not None else "every leaf is held out"
         place = ("splits", split) if split is not None else ("held_out",)

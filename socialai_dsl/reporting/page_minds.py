@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
+from math import isnan
 from statistics import mean, stdev
 from typing import Any, Final
 
@@ -139,9 +140,7 @@ def _success(minds: Minds) -> Rows:
         "success": lambda name: _with_interval(rates[name]),
         "episodes": lambda name: f"{rates[name].episodes:,}",
         "of": lambda name: _clusters(rates[name], of[name]),
-        "steps, mean": lambda name: (
-            NONE if rates[name].steps != rates[name].steps else f"{rates[name].steps:.1f}"
-        ),
+        "steps, mean": lambda name: NONE if isnan(rates[name].steps) else f"{rates[name].steps:.1f}",
     }
     return [{"": line, **{name: cell(name) for name, _ in minds}} for line, cell in lines.items()]
 

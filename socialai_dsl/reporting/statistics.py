@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import gammaln
 
+from socialai_dsl.baselines import wilson
+
 Float = NDArray[np.float64]
 
 RESAMPLES: Final = 10_000
@@ -216,18 +218,8 @@ def clustered_rate(successes: Sequence[float], episodes: Sequence[float]) -> Est
             quantile = (1 + LEVEL) / 2
             freedom = (stats.t.ppf(quantile, total - 1) / stats.t.ppf(quantile, clusters - 1)) ** 2
             effective = min(total, rate * (1 - rate) / variance * freedom) if variance else total
-    low, high = _wilson(rate, effective)
+    low, high = wilson(rate, effective)
     return Estimate(rate, low, high)
-
-
-def _wilson(rate: float, trials: float) -> tuple[float, float]:
-    """Wilson's score interval (1927) of a rate, for any number of trials that is above 0."""
-    z = float(stats.norm.ppf((1 + LEVEL) / 2))
-    spread = z * z / trials
-    centre = (rate + spread / 2) / (1 + spread)
-    half = math.sqrt(rate * (1 - rate) * spread + spread * spread / 4) / (1 + spread)
-    # At the ends the formula gives 0 and 1 but for rounding.
-    return (0.0 if rate == 0 else centre - half), (1.0 if rate == 1 else centre + half)
 
 
 def frames_to(frames: Float, success: Float, threshold: float) -> float | None:

@@ -19,10 +19,8 @@ from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
-from socialai_dsl.study.replay import header_of, reset_of, study_file, tell_of
+from socialai_dsl.study.replay import Row, header_of, reset_of, study_file, tell_of
 from socialai_dsl.trainer.shipped import PREFIX
-
-Row = dict[str, Any]
 
 MOST_LINES: Final = 200
 """How many of the last lines that were heard a page shows."""

@@ -198,8 +198,12 @@ def test_checking_needs_none_of_the_heavy_libraries():
     assert done.stdout.strip() == "[]"
 
 
+# -- what lies outside -------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize(
-    "named", ["../outside/secret.yaml", "linked/secret.yaml", "link.yaml", "{out}/secret.yaml"]
+    "named",
+    ["../outside/secret.yaml", "linked/secret.yaml", "link.yaml", "{out}/secret.yaml", "./circle.yaml"],
 )
 @pytest.mark.parametrize(
     "text",
@@ -212,14 +216,30 @@ def test_checking_needs_none_of_the_heavy_libraries():
     ],
 )
 def test_no_file_reads_what_lies_outside_its_folder(named: str, text: str, tmp_path: Path) -> None:
-    own, out = tmp_path / "own", tmp_path / "outside"
+    assert found_outside(text, named, tmp_path) == "S505"
+
+
+@pytest.mark.parametrize("named", ["../outside/page.md", "linked/page.md", "{out}/page.md", "circle.md"])
+@pytest.mark.parametrize("text", ["consent: {0}", "consent: I agree.\ninstructions: [{0}]"])
+def test_no_study_shows_what_lies_outside_its_folder(named: str, text: str, tmp_path: Path) -> None:
+    text = f"study: s\n{text}\nblocks: [{{{{scenario: help, episodes: 1}}}}]\n"
+    assert found_outside(text, named, tmp_path) == "S903"
+
+
+def found_outside(text: str, named: str, place: Path) -> str:
+    """The one finding of a file that names another, which is not opened."""
+    own, out = place / "own", place / "outside"
     own.mkdir()
     out.mkdir()
     (out / "secret.yaml").write_text("scenario: secret\nabout: The number is 666.\n")
+    (out / "page.md").write_text("The number is 666.\n")
     (own / "linked").symlink_to(out)
     (own / "link.yaml").symlink_to(out / "secret.yaml")
+    for name in ("circle.yaml", "circle.md"):
+        (own / name).symlink_to(own / name)
     (own / "f.yaml").write_text(text.format(named.format(out=out)))
     with listening() as ear:
         (found,) = check(own / "f.yaml").diagnostics
-    assert (found.code, found.span.file.endswith("f.yaml")) == ("S505", True)
-    assert not [path for path in ear.opened if "secret" in os.path.realpath(path)]
+    assert found.span.file.endswith("f.yaml")
+    assert not [path for path in ear.opened if os.path.realpath(path).startswith(str(out))]
+    return found.code
