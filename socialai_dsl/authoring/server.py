@@ -15,7 +15,7 @@ from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.loader.reader import display_name, read_document
+from socialai_dsl.loader.reader import display_name, followed, read_document
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.source import Node, Source, Span, TextEdit
 
@@ -162,7 +162,7 @@ class Server(LanguageServer):
 def path_of(uri: str) -> Path:
     """The file of a URI; one that is not saved yet is taken to be in the working directory."""
     path = to_fs_path(uri) if uri.startswith("file:") else None
-    return Path(path).resolve() if path else Path("unsaved.yaml").resolve()
+    return followed(Path(path or "unsaved.yaml"))
 
 
 def make_server() -> Server:

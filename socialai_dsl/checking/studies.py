@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Final
 from socialai_dsl.checking.experiments import from_anywhere
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, advice_on
-from socialai_dsl.loader.reader import display_name, is_file, read_source
+from socialai_dsl.loader.reader import display_name, followed, is_file, read_source
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.study import PERSON, WHO, Block, Question, Study
@@ -180,8 +179,8 @@ class _Check:
 
     def _beside(self, name: str) -> Path | None:
         """A file in the study's folder; None if there is none, or if it lies elsewhere."""
-        file = Path(os.path.realpath(self._folder / name))  # which takes links in a circle, too
-        return file if file.is_relative_to(os.path.realpath(self._folder)) and is_file(file) else None
+        file = followed(self._folder / name)
+        return file if file.is_relative_to(followed(self._folder)) and is_file(file) else None
 
     def questions(self, study: Study) -> None:
         """Report questions that cannot be answered, and names that two of them have."""

@@ -20,7 +20,7 @@ from socialai_dsl.frontend import check
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.loader.given import given_files
-from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.reader import display_name, followed
 from socialai_dsl.loader.resolved import TESTS, resolve, taken_apart
 from socialai_dsl.semantics.plans import DialoguePlan
 from socialai_dsl.source import Source
@@ -125,10 +125,10 @@ def _files(name: str, texts: Mapping[Path, Source]) -> Iterator[tuple[str, str]]
     """The files that may have tests of a name, and the end of the names of the scenarios that these are to play."""
     base, suffix = taken_apart(name)
     path = Path(base)
-    if not path.is_file() and path.resolve() not in texts:
+    if not path.is_file() and followed(path) not in texts:
         path = resolve(base).path
     for file in dict.fromkeys((path, path.with_name(path.stem.removesuffix(".tests") + TESTS))):
-        own = texts.get(file.resolve())
+        own = texts.get(followed(file))
         text = own.text if own else file.read_text("utf-8", "replace") if file.is_file() else ""
         if _HAS_TESTS.search(text):
             yield display_name(file), suffix

@@ -67,6 +67,14 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def followed(path: Path) -> Path:
+    """The path without links; where they lead in a circle, a path at which there is nothing to read.
+
+    `Path.resolve` raises there.
+    """
+    return Path(os.path.realpath(path))
+
+
 def read_source(path: Path, name: str | None = None) -> Source:
     """The text of a file, called `name` (by default its path) in messages.
 

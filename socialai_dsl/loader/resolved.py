@@ -18,6 +18,7 @@ from socialai_dsl.loader.reader import (
     SUFFIXES,
     Library,
     display_name,
+    followed,
     is_file,
     shipped_folder,
     yaml_files,
@@ -756,11 +757,11 @@ def _named_file(part: NamePart, folder: Path, source: Source, texts: Mapping[Pat
     else:
         candidates = [_with_suffix(shipped), _with_suffix(beside)]
     for candidate in candidates:
-        if is_file(candidate) or (texts and candidate.resolve() in texts):
-            return candidate.resolve()
+        if is_file(candidate) or (texts and followed(candidate) in texts):
+            return followed(candidate)
     if os.path.lexists(beside):
         # Reading it says what is wrong with it: a folder, a pipe, a link that leads nowhere.
-        return Path(os.path.realpath(beside))
+        return followed(beside)
     found = DiagnosticBag()
     if looks_like_path(text):
         head = text[: text.rfind("/") + 1]

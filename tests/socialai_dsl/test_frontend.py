@@ -12,6 +12,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
+from socialai_dsl.source import Source
 from tests.fuzzing.playground import listening
 
 ROOT = Path(__file__).parent.parent.parent
@@ -243,3 +244,14 @@ def found_outside(text: str, named: str, place: Path) -> str:
     assert found.span.file.endswith("f.yaml")
     assert not [path for path in ear.opened if os.path.realpath(path).startswith(str(out))]
     return found.code
+
+
+@pytest.mark.parametrize("named", ["circle.yaml", "circle"])
+def test_links_in_a_circle_are_followed_nowhere_beside_an_unsaved_file(
+    named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("circle.yaml").symlink_to("circle.yaml")
+    unsaved = {tmp_path / "draft.yaml": Source("draft.yaml", "scenario: draft\n")}
+    assert {found.code for found in check(named, unsaved).diagnostics} <= {"S007", "S504"}
+    assert check(named, unsaved).has_errors

@@ -232,3 +232,39 @@ def test_what_cannot_play_is_told_so(
 
 def nothing() -> EvalResult:
     return EvalResult(np.ones(1, bool), np.zeros(1, int), np.ones(1, int), np.zeros(1), ("success",))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "validate circle.yaml",
+        "validate experiment.yaml",
+        "validate study.yaml",
+        "fmt circle.yaml",
+        "test circle.yaml",
+        "check circle.yaml",
+        "trace circle.yaml",
+        "run circle.yaml",
+        "run help --curriculum circle.yaml",
+        "run help --config circle.yaml",
+        "evaluate circle.yaml --on help",
+        "evaluate random --on circle.yaml",
+        "report circle.yaml",
+        "study status circle.yaml",
+        "experiment plan circle.yaml",
+        "replay circle.yaml",
+    ],
+)
+def test_links_in_a_circle_are_a_mistake_of_whoever_names_them(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("circle.yaml").symlink_to("circle.yaml")
+    Path("experiment.yaml").write_text("experiment: e\nconditions: [{name: a, scenario: circle.yaml}]\n")
+    Path("study.yaml").write_text(
+        "study: s\nconsent: I agree.\nblocks: [{scenario: circle.yaml, episodes: 1}]\n"
+    )
+    assert main(words.split()) in (1, 2)
+    said = "".join(capsys.readouterr())
+    assert said
+    assert "internal error" not in said
