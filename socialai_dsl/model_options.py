@@ -27,7 +27,7 @@ class ModelOptions:
         concurrency: number of episodes played at once.
         timeout: time limit of one reply, seconds.
         budget: limit of what is spent: 200000 tokens, or 2.50usd where prices are given.
-        prices: US dollars for a million tokens of requests and a million of replies.
+        prices: US dollars for a million tokens of requests and of replies, or a YAML file with MODEL: [IN, OUT].
 
     Raises:
         OptionError: replies are to be held to a grammar that have a form already.

@@ -11,6 +11,7 @@ from typing import Final
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.errors import OptionError
+from socialai_dsl.loader.prices import is_table, prices_of
 from socialai_dsl.loader.reader import SUFFIXES, display_name, shipped_folder
 from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names
 from socialai_dsl.model_options import ModelOptions
@@ -118,6 +119,12 @@ def from_anywhere(name: str, folder: Path) -> str:
     return os.path.abspath(folder / base) + name[len(base) :]
 
 
+def prices_from_anywhere(cell: Cell, folder: Path) -> str:
+    """The prices of a condition's model, a table of them as it is called from any working directory."""
+    given = str(cell.model["prices"])
+    return os.path.abspath(folder / given) if is_table(given) else given
+
+
 def _is_in(folder: Path, name: str) -> bool:
     """Whether a folder has a file of this name, with or without the suffix."""
     return any((folder / f"{name}{end}").is_file() for end in ("", ".yaml"))
@@ -188,8 +195,10 @@ def _check_playing(cell: Cell, resolved: ResolvedFile, bag: DiagnosticBag) -> No
         bag.error("S104", f"`{cell.agent}` plays one scenario, without `tests`", span, hint=hint)
     try:
         ModelOptions(**cell.model)
+        if cell.agent.startswith(MODEL_PREFIX) and "prices" in cell.model:
+            prices_of(cell.agent.removeprefix(MODEL_PREFIX), prices_from_anywhere(cell, resolved.path.parent))
     except OptionError as error:
-        bag.error("S104", str(error), resolved.tree.value_span(cell.places["model"]))
+        bag.error("S104", str(error), resolved.tree.value_span((*cell.places["model"], error.name)))
 
 
 _NAMES: Final = {"net": NETS, "bonus": BONUSES, "guide": ("none", "script")}

@@ -18,7 +18,7 @@ _VALUES: Final[dict[str, tuple[str, Any]]] = {
     "concurrency": ("N", at_once),
     "timeout": ("SECONDS", seconds),
     "budget": ("N", str),
-    "prices": ("IN,OUT", str),
+    "prices": ("IN,OUT|FILE", str),
 }
 """Option -> what its value is called, and what reads it; the others are words to choose from, or switches."""
 

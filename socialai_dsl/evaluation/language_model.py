@@ -29,6 +29,7 @@ from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.prompting import PromptOptions
 from socialai_dsl.llm.questions import score
+from socialai_dsl.loader.prices import MOST_DOLLARS, prices_of
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
@@ -43,7 +44,6 @@ if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
 TRANSCRIPTS: Final = "transcripts"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _SECONDS_BETWEEN_LINES: Final = 5.0
-_MOST_SPENT: Final = 1e12
 _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
 
 
@@ -227,7 +227,8 @@ def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
     if not model:
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
-    return Endpoint(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
+    prices = None if options.prices is None else prices_of(model, options.prices)
+    return Endpoint(model, url, key.strip(), asked, options.timeout, prices)
 
 
 def _is_unicode(text: str) -> bool:
@@ -239,18 +240,6 @@ def _is_unicode(text: str) -> bool:
     return True
 
 
-def _prices(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    try:
-        prompt, completion = (float(part) for part in text.split(","))
-    except ValueError:
-        prompt = completion = -1.0
-    if not (0 <= prompt <= _MOST_SPENT and 0 <= completion <= _MOST_SPENT):
-        raise UsageError(f"--prices: got {shortened(text)}, expected two amounts such as 0.15,0.60")
-    return prompt, completion
-
-
 def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
     from socialai_dsl.llm.players import Budget
 
@@ -258,15 +247,15 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
         return Budget()
     match = _BUDGET.fullmatch(text.strip())
     amount = 0.0 if match is None else float(match[1].replace(",", "").replace("_", ""))
-    if match is None or not 0 < amount <= _MOST_SPENT:
+    if match is None or not 0 < amount <= MOST_DOLLARS:
         raise UsageError(
             f"--budget: got {shortened(text)}, expected an amount such as 200000 or 2.50usd, above 0 and at most "
-            f"{_MOST_SPENT:g}"
+            f"{MOST_DOLLARS:g}"
         )
     if (match[2] or "").lower() != "usd":
         return Budget(tokens=int(amount))
     if prices is None:
-        raise UsageError("--budget: an amount of money needs --prices IN,OUT to be counted")
+        raise UsageError("--budget: an amount of money needs --prices to be counted")
     return Budget(cost=amount)
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere, is_phases
+from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere, is_phases, prices_from_anywhere
 from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.runs.options import resolved_config, usual_options
@@ -224,6 +224,8 @@ def _options(cell: Cell, folder: Path) -> dict[str, Any]:
     options = options_of(cell)
     if is_phases(options.get("curriculum")):
         options["curriculum"] = from_anywhere(options["curriculum"], folder)
+    if "prices" in options.get("model", {}):
+        options["model"]["prices"] = prices_from_anywhere(cell, folder)
     return options
 
 

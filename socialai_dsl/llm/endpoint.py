@@ -71,7 +71,7 @@ class Usage:
     """The tokens and cost of requests.
 
     Attributes:
-        prompt, completion: tokens. cost: in US dollars; None if prices are not known.
+        prompt, completion: tokens. cost: in US dollars; None if the price of any of them is not known.
         reasoning: those tokens of completions that are thoughts, as far as the server counts them.
         estimated: whether the server did not say how many tokens there were, so that four characters count as one.
     """
@@ -88,11 +88,11 @@ class Usage:
         return self.prompt + self.completion
 
     def __add__(self, other: Usage) -> Usage:
-        costs = [cost for cost in (self.cost, other.cost) if cost is not None]
+        costs = [one.cost for one in (self, other) if one.tokens or one.cost is not None]
         return Usage(
             self.prompt + other.prompt,
             self.completion + other.completion,
-            sum(costs) if costs else None,
+            sum(cost for cost in costs if cost is not None) if costs and None not in costs else None,
             self.estimated or other.estimated,
             self.reasoning + other.reasoning,
         )

@@ -576,7 +576,12 @@ def test_the_key_is_sent_and_appears_nowhere(tmp_path: Path, capsys: Capture, ca
         (["--base-url", "http://[::1"], "--base-url: got 'http://[::1'"),
         (["--goal", "\udcff"], "--goal: got '\\udcff', expected a text in Unicode"),
         (["--budget", "1usd"], "--budget: an amount of money needs --prices"),
-        (["--prices", "1"], "--prices: got '1', expected two amounts such as 0.15,0.60"),
+        (
+            ["--prices", "1"],
+            "--prices: got '1', expected two amounts such as 0.15,0.60, or a table such as prices.yaml",
+        ),
+        (["--prices", "nan,1"], "--prices: got 'nan,1', expected two amounts"),
+        (["--prices", "none.yaml"], "--prices: none.yaml:1:1: S007 there is no such file"),
     ],
 )
 def test_mistakes_are_told_in_one_line(
@@ -587,6 +592,56 @@ def test_mistakes_are_told_in_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("gpt-5: [1.25, 10]\nmm: [1, 2]", "prices.yaml has no prices of the model 'm'; it has gpt-5, mm"),
+        ("M: [1, 2]", "prices.yaml has no prices of the model 'm'; it has M"),
+        ("", "prices.yaml:1:1: got empty, expected models by name"),
+        ("- m", "prices.yaml:1:1: got a list, expected models by name"),
+        ("m: [1]", "prices.yaml:1:4: got [1], expected two amounts such as [0.15, 0.60]"),
+        ("m: 1,2", "prices.yaml:1:4: got '1,2', expected two amounts such as [0.15, 0.60]"),
+        ("m: [1, -2]", "prices.yaml:1:4: got [1, -2], expected two amounts such as [0.15, 0.60]"),
+        ("m: [1, true]", "prices.yaml:1:4: got [1, True], expected two amounts such as [0.15, 0.60]"),
+        ("m: [1, 2", "prices.yaml:1:4: S001 not YAML: "),
+    ],
+)
+def test_a_table_of_prices_has_two_amounts_for_the_model(
+    table: str, said: str, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("prices.yaml").write_text(table, encoding="utf-8")
+    with endpoint(lambda _: "Act: done") as stub:
+        command = ["evaluate", "llm:m", "--base-url", stub.url, "--on", "help", "--out", "out"]
+        assert main([*command, "--episodes", "1", "--prices", "prices.yaml"]) == 2
+    error = capsys.readouterr().err
+    assert f"--prices: {said}" in error
+    assert error.count("\n") == 1
+    assert not stub.requests
+    assert not Path("out").exists()
+
+
+def test_a_table_has_the_prices_of_each_model_of_a_game(tmp_path: Path) -> None:
+    table = tmp_path / "prices.yaml"
+    table.write_text(
+        "stub: [1, 2]  # dollars for a million tokens\norg/other:8b: [10, 20]\n", encoding="utf-8"
+    )
+    with endpoint(lambda _: "Act: left") as stub:
+        options = ["--seat", "jill=llm:org/other:8b", "--prices", str(table)]
+        assert evaluate(stub.url, tmp_path / "out", *options, on="together/help_together", episodes=1) == 0
+    found = figures(tmp_path / "out", "together/help_together")["eval"]
+    jill = found["models"]["jill"]
+    assert found["cost"] == pytest.approx(found["replies"] * (10 * 1 + 2 * 2) / 1e6)
+    assert jill["cost"] == pytest.approx(jill["replies"] * (10 * 10 + 2 * 20) / 1e6)
+
+
+def test_the_cost_of_replies_some_of_which_had_no_prices_is_not_known(tmp_path: Path) -> None:
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path, "--budget", "60", "--concurrency", "1", on="dance") == 4
+        assert evaluate(stub.url, tmp_path, "--prices", "1,2", on="dance") == 0
+    assert figures(tmp_path, "dance")["eval"]["cost"] is None
 
 
 @pytest.mark.parametrize("time", ["0", "-1", "nan", "inf", "soon"])

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.document import document_of
 from socialai_dsl.experiments.folder import read_experiment, runs_of
 from socialai_dsl.frontend import load_experiment
@@ -113,3 +114,25 @@ def test_what_decides_about_replies_makes_another_run(tmp_path: Path) -> None:
     assert {name: run for name, run in other.items() if name != "model"} == {
         name: run for name, run in first.items() if name != "model"
     }
+
+
+def test_a_table_of_prices_stands_beside_the_experiment(tmp_path: Path) -> None:
+    """A run is given its path from anywhere; a model that it lacks is a finding, where the table is named."""
+    file, table = tmp_path / "minds.yaml", tmp_path / "prices.yaml"
+    file.write_text(
+        FILE.replace("URL", "http://localhost:1/v1").replace("LIMIT", "prices: prices.yaml"), "utf-8"
+    )
+    table.write_text("stub: [1, 2]\n", encoding="utf-8")
+    (model,) = [
+        one for one in document_of(load_experiment(file), None)["conditions"] if one["name"] == "model"
+    ]
+    assert model["options"]["model"]["prices"] == str(table)
+    table.write_text("stubb: [1, 2]\n", encoding="utf-8")
+    with pytest.raises(ScenarioError) as caught:
+        load_experiment(file)
+    (found,) = caught.value.diagnostics
+    assert found.code == "S104"
+    assert "has no prices of the model 'stub'; did you mean stubb?" in found.message
+    assert (
+        found.span.column == FILE.splitlines()[-1].replace("URL", "http://localhost:1/v1").index("LIMIT") + 9
+    )
