@@ -27,7 +27,18 @@ from socialai_dsl.checking.scenarios import (
     with_frames,
     with_rival,
 )
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, check_seats, check_study, scripts_agent
+from socialai_dsl.checking.studies import (
+    AGENT,
+    PRACTICE,
+    LoadedStudy,
+    check_block_names,
+    check_seats,
+    check_study,
+    is_model,
+    players_of,
+    rival_of_agent,
+    scripts_agent,
+)
 from socialai_dsl.checking.suites import check_suite
 from socialai_dsl.checking.tests import KIND as TESTS_OF
 from socialai_dsl.checking.tests import Tested, check_tests, tested_by
@@ -554,7 +565,9 @@ def _check(
         study, files = check_study(resolved, bag), dict(resolved.files)
         if study is not None:
             in_study = _check_study_played(study, bag, files)
-            study = None if bag.has_errors else replace(study, played=in_study)
+            study = replace(study, played=in_study)
+            check_block_names(study, bag)
+            study = None if bag.has_errors else study
         return _sifted(CheckResult(name, None, None, tuple(bag), files, resolved, study=study))
     if resolved.kind == TESTS_OF:
         tested = check_tests(resolved, bag)
@@ -669,15 +682,22 @@ def _check_study_played(
         played[number] = loaded
         if number == PRACTICE or not check_seats(study, number, loaded, bag):
             continue
-        if scripts_agent(study.study.blocks[number]):
-            try:
-                played[number] = closest_script(name, loaded).loaded
-            except ScenarioError as error:
-                _add_findings(error, place, study.resolved, bag, files)
-                continue
-            if lacking := unscripted(played[number]):
-                hint = "give it a variant `oracle` in which the agent follows a frame, or the block `stands_in: random`"
-                bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
+        block = study.study.blocks[number]
+        rival = rival_of_agent(block)
+        if rival is None and not scripts_agent(block):
+            continue
+        try:
+            framed = closest_script(name, loaded).loaded if rival is None else load(variant_of(name, rival))
+        except ScenarioError as error:
+            _add_findings(error, place, study.resolved, bag, files)
+            continue
+        lacking = unscripted(framed)
+        if lacking and is_model(players_of(block)[AGENT]):
+            continue  # where it fails nobody takes over
+        played[number] = framed
+        if lacking:
+            hint = "give it a variant `oracle` in which the agent follows a frame, or the block `stands_in: random`"
+            bag.error("S704", f"there is no script for the agent of `{lacking[0]}`", span, hint=hint)
     return played
 
 

@@ -111,8 +111,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
     "llm": (
-        TEXT_SIDE | {"atomic", "program", "program_suite", "envs", "episodes", "render", "traces"},
-        {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
+        TEXT_SIDE
+        | {"atomic", "errors", "model_options", "program", "program_suite", "envs", "episodes", "render"}
+        | {"traces"},
+        {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic", CONFIG},
     ),
     "web": ({"traces"}, {"starlette"}),
     "study.columns": (set(), set()),
@@ -148,10 +150,21 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
             "episodes",
             "traces",
             "llm",
+            "model_options",
             "web",
             "runs.lock",
         },
-        {"numpy", "pydantic", "markdown_it", "starlette", "uvicorn", "websockets", "pyarrow", SHIPPED},
+        {
+            "httpx",
+            "numpy",
+            "pydantic",
+            "markdown_it",
+            "starlette",
+            "uvicorn",
+            "websockets",
+            "pyarrow",
+            SHIPPED,
+        },
     ),
     "runs.options": (
         TEXT_SIDE | {"errors"},

@@ -119,9 +119,8 @@ def from_anywhere(name: str, folder: Path) -> str:
     return os.path.abspath(folder / base) + name[len(base) :]
 
 
-def prices_from_anywhere(cell: Cell, folder: Path) -> str:
-    """The prices of a condition's model, a table of them as it is called from any working directory."""
-    given = str(cell.model["prices"])
+def prices_from_anywhere(given: str, folder: Path) -> str:
+    """Prices of models as a file gives them, a table of them as it is called from any working directory."""
     return os.path.abspath(folder / given) if is_table(given) else given
 
 
@@ -196,7 +195,8 @@ def _check_playing(cell: Cell, resolved: ResolvedFile, bag: DiagnosticBag) -> No
     try:
         ModelOptions(**cell.model)
         if cell.agent.startswith(MODEL_PREFIX) and "prices" in cell.model:
-            prices_of(cell.agent.removeprefix(MODEL_PREFIX), prices_from_anywhere(cell, resolved.path.parent))
+            prices = prices_from_anywhere(str(cell.model["prices"]), resolved.path.parent)
+            prices_of(cell.agent.removeprefix(MODEL_PREFIX), prices)
     except OptionError as error:
         bag.error("S104", str(error), resolved.tree.value_span((*cell.places["model"], error.name)))
 

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.checking.experiments import from_anywhere
+from socialai_dsl.checking.experiments import from_anywhere, prices_from_anywhere
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, advice_on
+from socialai_dsl.errors import OptionError
+from socialai_dsl.loader.prices import prices_of
 from socialai_dsl.loader.reader import display_name, followed, is_file, read_source
 from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.schema.shape import model_of
-from socialai_dsl.schema.study import PERSON, WHO, Block, Question, Study
+from socialai_dsl.schema.study import PERSON, STANDING_IN, WHO, Block, Question, Study
 from socialai_dsl.semantics.study import Design, design_of
-from socialai_dsl.source import DataPath
+from socialai_dsl.source import DataPath, Span
+from socialai_dsl.trainer.config import MODEL_PREFIX, RIVAL_PREFIX
 from socialai_dsl.trainer.shipped import PREFIX, shipped_agents
 
 AGENT: Final = "agent"
+SCRIPT: Final = "script"
 PRACTICE: Final = -1
 """Stands for the number of a block where practice is meant."""
 
@@ -44,8 +49,8 @@ class LoadedStudy:
         study: the models. resolved: the data with its positions.
         design: which groups play which blocks in which rooms.
         consent, instructions: the pages, in Markdown. pictures: those that they show, name -> file.
-        played: number of a block, or `PRACTICE` -> what is played there; where a script is to stand in for the agent,
-            the scenario with that script.
+        played: number of a block, or `PRACTICE` -> what is played there; where a script or a rival is to play the
+            agent, the scenario with that frame.
     """
 
     study: Study
@@ -72,6 +77,32 @@ class LoadedStudy:
             yield number, from_anywhere(block.scenario, self.folder), ("blocks", number, "scenario")
 
 
+def block_name(loaded: LoadedStudy, number: int) -> str:
+    """What a block, or practice, is called in the data."""
+    if number == PRACTICE:
+        return "practice"
+    return loaded.study.blocks[number].name or f"{loaded.played[number].name}_{number + 1}"
+
+
+def check_block_names(loaded: LoadedStudy, bag: DiagnosticBag) -> None:
+    """Report blocks that the data could not tell apart, or from practice."""
+    known = {block_name(loaded, PRACTICE)}
+    for number in loaded.played:
+        if number == PRACTICE:
+            continue
+        name = block_name(loaded, number)
+        if name in known:
+            place = ("blocks", number, "name" if loaded.study.blocks[number].name else "scenario")
+            hint = "give it another `name`"
+            message = (
+                f"`{name}` is the name of practice"
+                if name == block_name(loaded, PRACTICE)
+                else f"there is another block `{name}`"
+            )
+            bag.error("S213", message, loaded.resolved.tree.value_span(place), hint=hint)
+        known.add(name)
+
+
 def seats_of(block: Block) -> dict[str, str]:
     """Who has the seats of a block that it speaks of; the agent's is a person's unless it says otherwise."""
     return {AGENT: PERSON} | dict(block.seats or {})
@@ -82,10 +113,67 @@ def persons_of(block: Block) -> tuple[str, ...]:
     return tuple(seat for seat, who in seats_of(block).items() if who == PERSON)
 
 
+def stand_ins_of(block: Block) -> dict[str, str]:
+    """Who takes over the seats of a block that people play, where others would wait for who is not there."""
+    persons = persons_of(block)
+    if len(persons) < 2:
+        return {}
+    if isinstance(block.stands_in, str):
+        return dict.fromkeys(persons, block.stands_in)
+    return {seat: block.stands_in.get(seat, SCRIPT) for seat in persons}
+
+
+def players_of(block: Block) -> dict[str, str]:
+    """Who may choose the acts of seats of a block besides people: of each such seat its player, or who stands in."""
+    others = {seat: who for seat, who in seats_of(block).items() if who != PERSON}
+    return others | stand_ins_of(block)
+
+
+def is_model(who: str) -> bool:
+    """Whether a language model is meant."""
+    return who.startswith(MODEL_PREFIX)
+
+
+def is_rival(who: str) -> bool:
+    """Whether a rival of the scenario is meant."""
+    return who.startswith(RIVAL_PREFIX)
+
+
+def is_trained(who: str) -> bool:
+    """Whether a trained agent is meant, by its name or its path."""
+    return not (who in WHO or is_model(who) or is_rival(who))
+
+
+def rival_of_agent(block: Block) -> str | None:
+    """The rival that plays the agent of a block, now or when a person leaves; None if none does."""
+    who = players_of(block).get(AGENT, "")
+    return who.removeprefix(RIVAL_PREFIX) if is_rival(who) else None
+
+
 def scripts_agent(block: Block) -> bool:
-    """Whether the agent of a block has to follow a script, now or when a person leaves."""
-    several = len(persons_of(block)) > 1 and AGENT in persons_of(block)
-    return seats_of(block)[AGENT] == "script" or (several and block.stands_in == "script")
+    """Whether the agent of a block has to follow its script, now or when a person leaves or a model fails."""
+    who = players_of(block).get(AGENT, "")
+    return who == SCRIPT or is_model(who)
+
+
+def asked_by(study: Study, folder: Path) -> ModelOptions:
+    """How a study whose file lies in a folder asks language models.
+
+    Raises:
+        OptionError: its options do not go together, or prices lack a model.
+    """
+    given = {} if study.model is None else study.model.model_dump(exclude_none=True)
+    if "prices" in given:
+        given["prices"] = prices_from_anywhere(given["prices"], folder)
+        for who in models_of(study):
+            prices_of(who.removeprefix(MODEL_PREFIX), given["prices"])
+    return ModelOptions(**given)
+
+
+def models_of(study: Study) -> tuple[str, ...]:
+    """The language models that may play in a study, each once."""
+    found = (who for block in study.blocks for who in players_of(block).values() if is_model(who))
+    return tuple(dict.fromkeys(found))
 
 
 def check_study(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedStudy | None:
@@ -100,8 +188,9 @@ def check_study(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedStudy | Non
         check.page(page, ("instructions", number), pictures) for number, page in enumerate(study.instructions)
     ]
     check.questions(study)
+    check.model(study)
     for number, block in enumerate(study.blocks):
-        check.who(block, ("blocks", number, "seats"))
+        check.who(block, ("blocks", number))
     design = design_of(study, shaped.tree, bag)
     check.participants(study, design)
     return LoadedStudy(study, resolved, design or Design((), ()), consent, tuple(instructions), pictures)
@@ -112,20 +201,54 @@ def check_seats(study: LoadedStudy, number: int, loaded: Loaded, bag: Diagnostic
     known = len(bag)
     block, tree = study.study.blocks[number], study.resolved.tree
     names, scripted = _seats(loaded)
-    for seat in block.seats or ():
-        if seat not in names:
-            span = tree.key_span(("blocks", number, "seats", seat))
-            advice = advice_on(seat, names, "its seats are " + ", ".join(names))
-            bag.error("S201", f"`{loaded.name}` has no seat `{seat}`", span, **advice)
-    several = len(persons_of(block)) > 1
-    for seat, who in (block.seats or {}).items():
-        stands_in = several and who == PERSON and block.stands_in == "script"
+    for key, seats in _written(block):
+        for seat in seats:
+            if seat not in names:
+                span = tree.key_span(("blocks", number, key, seat))
+                advice = advice_on(seat, names, "its seats are " + ", ".join(names))
+                bag.error("S201", f"`{loaded.name}` has no seat `{seat}`", span, **advice)
+    stand_ins = stand_ins_of(block)
+    for seat, who in players_of(block).items():
+        place = _place_of(block, seat)
+        span = tree.value_span(("blocks", number, *place))
         # What the agent follows may come from the variant `oracle`, which is looked for where it is played.
-        if seat in names and seat != AGENT and (who == "script" or stands_in) and seat not in scripted:
-            span = tree.value_span(("blocks", number, "seats", seat))
-            hint = "`stands_in: random`, or `stands_in: nobody`" if stands_in else "one of " + ", ".join(WHO)
+        if seat in names and seat != AGENT and who == SCRIPT and seat not in scripted:
+            hint = (
+                "`stands_in: random`, or `stands_in: nobody`"
+                if seat in stand_ins
+                else "one of " + ", ".join(WHO)
+            )
             bag.error("S704", f"there is no script for `{seat}` of `{loaded.name}`", span, hint=hint)
+        if seat == AGENT and is_rival(who):
+            _check_rival(who.removeprefix(RIVAL_PREFIX), loaded, span, bag)
     return len(bag) == known
+
+
+def _written(block: Block) -> Iterator[tuple[str, Mapping[str, str]]]:
+    """The keys of a block that say by seat who plays it."""
+    yield "seats", block.seats or {}
+    if not isinstance(block.stands_in, str):
+        yield "stands_in", block.stands_in
+
+
+def _place_of(block: Block, seat: str) -> DataPath:
+    """Where a block says who plays a seat, or stands in there; of what it leaves unsaid, where the seat is named."""
+    if seat in stand_ins_of(block):
+        if not isinstance(block.stands_in, str) and seat in block.stands_in:
+            return ("stands_in", seat)
+        if isinstance(block.stands_in, str) and block.stands_in not in STANDING_IN:
+            return ("stands_in",)
+    return ("seats", seat)
+
+
+def _check_rival(rival: str, loaded: Loaded, span: Span, bag: DiagnosticBag) -> None:
+    """Report a rival that a scenario does not have."""
+    for one in loaded.members if isinstance(loaded, LoadedSuite) else (loaded,):
+        assert isinstance(one, LoadedScenario), "internal: there is nothing else that can be played"
+        rivals = list(one.scenario.rivals)
+        if rival not in rivals:
+            advice = advice_on(rival, rivals, f"its rivals are {', '.join(rivals) or 'none'}")
+            bag.error("S201", f"`{one.name}` has no rival `{rival}`", span, **advice)
 
 
 def _seats(loaded: Loaded) -> tuple[tuple[str, ...], frozenset[str]]:
@@ -222,20 +345,55 @@ class _Check:
                 span = self._tree.value_span((*place, "options", number))
                 self._bag.error("S213", f"there is another option `{option}`", span)
 
+    def model(self, study: Study) -> None:
+        """Report options of language models that do not go together."""
+        try:
+            asked_by(study, self._folder)
+        except OptionError as error:
+            self._bag.error("S104", str(error), self._tree.value_span(("model", error.name)))
+        for key in ("concurrency", "probes"):
+            if study.model is not None and getattr(study.model, key) is not None:
+                message = f"`{key}` changes nothing in a study: each model plays its own seat, and is asked no probes"
+                self._bag.error("S107", message, self._tree.key_span(("model", key)), hint="leave it out")
+
     def who(self, block: Block, place: DataPath) -> None:
-        """Report players that do not exist, and a block without a person."""
-        shipped = [PREFIX + name for name in shipped_agents()]
+        """Report players that do not exist or cannot have the seat, and a block without a person."""
         for seat, who in (block.seats or {}).items():
-            if who in (*WHO, *shipped) or (self._folder / who).exists():
-                continue
-            hint = f"one of {', '.join(WHO)}, {PREFIX}NAME, or the path of a checkpoint or of a run's folder"
-            message = f"there is no checkpoint `{who}` in {display_name(self._folder)}"
-            span = self._tree.value_span((*place, seat))
-            self._bag.error("S703", message, span, **advice_on(who, (*WHO, *shipped), hint))
+            self._player(who, (seat,), WHO, (*place, "seats", seat))
+        if isinstance(block.stands_in, str):
+            seats = tuple(stand_ins_of(block))
+            self._player(block.stands_in, seats, STANDING_IN, (*place, "stands_in"))
+        else:
+            for seat, who in block.stands_in.items():
+                where = (*place, "stands_in", seat)
+                self._player(who, (seat,), STANDING_IN, where)
+                if seat not in stand_ins_of(block):
+                    message = f"nobody stands in for `{seat}`"
+                    hint = "leave it out: people who play alone are waited for, and who is no person stays"
+                    self._bag.error("S107", message, self._tree.key_span(where), hint=hint)
         if not persons_of(block):
             message = "no seat of this block is a person's"
             hint = "give one of them `person`, or leave out who has the agent's"
-            self._bag.error("S904", message, self._tree.key_span(place), hint=hint)
+            self._bag.error("S904", message, self._tree.key_span((*place, "seats")), hint=hint)
+
+    def _player(self, who: str, seats: Sequence[str], words: Sequence[str], place: DataPath) -> None:
+        """Report a player that does not exist, or a rival on another seat than the agent's."""
+        shipped = [PREFIX + name for name in shipped_agents()]
+        span = self._tree.value_span(place)
+        if is_rival(who) and any(seat != AGENT for seat in seats):
+            message = f"`{who}` is a frame for the seat `{AGENT}` alone"
+            hint = f"by seat, with another player on the others: `stands_in: {{{AGENT}: {who}}}`"
+            hint = hint if AGENT in seats else f"one of {', '.join(words)}"
+            self._bag.error("S703", message, span, hint=hint)
+        named = who not in (MODEL_PREFIX, RIVAL_PREFIX) and (is_model(who) or is_rival(who))
+        if named or who in (*words, *shipped) or (who not in WHO and (self._folder / who).exists()):
+            return
+        known = f"{', '.join(words)}, {PREFIX}NAME, {MODEL_PREFIX}MODEL, {RIVAL_PREFIX}NAME for the agent"
+        hint = f"one of {known}, or the path of a checkpoint or of a run's folder"
+        message = f"there is no checkpoint `{who}` in {display_name(self._folder)}"
+        if who == PERSON:
+            message, hint = "a person stands in for nobody", f"one of {known}"
+        self._bag.error("S703", message, span, **advice_on(who, (*words, *shipped), hint))
 
     def participants(self, study: Study, design: Design | None) -> None:
         """Warn of groups that cannot be filled alike."""

@@ -1,7 +1,5 @@
 """Lets a language model play test episodes, and says what came of it."""
 
-import os
-import re
 import sys
 import time
 from collections import Counter
@@ -9,12 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib.util import find_spec
 from itertools import zip_longest
-from math import isfinite
 from pathlib import Path
-from reprlib import repr as shortened
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
-from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,22 +24,16 @@ from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.prompting import PromptOptions
 from socialai_dsl.llm.questions import score
-from socialai_dsl.loader.prices import MOST_DOLLARS, prices_of
-from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
 from socialai_dsl.traces.endings import Ending
 from socialai_dsl.traces.tracing import Answers
-from socialai_dsl.trainer.config import MODEL_PREFIX
 
 if TYPE_CHECKING:  # these need httpx, which is only there if it was asked for
-    from socialai_dsl.llm.endpoint import Endpoint
-    from socialai_dsl.llm.players import Budget, LanguageModelPlayer, PlayedEpisode, PlayedGame
+    from socialai_dsl.llm.players import LanguageModelPlayer, PlayedEpisode, PlayedGame
 
 TRANSCRIPTS: Final = "transcripts"
-_LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _SECONDS_BETWEEN_LINES: Final = 5.0
-_BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -154,11 +143,12 @@ def _model(
     Raises:
         UsageError, SettingsMismatchError: see `let_models_play`.
     """
+    from socialai_dsl.llm.asked import budget_of, endpoint_of
     from socialai_dsl.llm.players import LanguageModelPlayer, transcripts
 
     options = player.options
     assert options is not None, "internal: a language model has options"
-    endpoint, briefing = _endpoint(player.agent, options), player.briefing(loaded)
+    endpoint, briefing = endpoint_of(player.agent, options), player.briefing(loaded)
     asked: dict[str, Any] = {
         field.name: getattr(options, field.name, about["trials"]) for field in fields(PromptOptions)
     }
@@ -174,7 +164,7 @@ def _model(
         "probes": f"{prompting.probes} {Asker(loaded).sha256}" if probed else None,
     }
     place = transcripts(folder, settings)
-    budget = _budget(options.budget, endpoint.prices)
+    budget = budget_of(options.budget, endpoint.prices)
     return LanguageModelPlayer(program, endpoint, prompting, place, loaded, briefing, seat, budget)
 
 
@@ -193,70 +183,6 @@ def episodes_of_models(run: Path, program: Playable, most: int) -> ModelEpisodes
     if not kept.games:
         raise UsageError(f"{run}: no episode is over")
     return replace(_outcome(kept.games, program, kept.own), players=kept.players)
-
-
-def _endpoint(agent: str, options: ModelOptions) -> "Endpoint":
-    from socialai_dsl.llm.endpoint import OPENAI, Endpoint
-
-    for name, given in (("the model", agent), ("--base-url", options.base_url)):
-        if not _is_unicode(given or ""):
-            raise UsageError(f"{name}: got {given!r}, expected a text in Unicode")
-    if options.temperature is not None and not isfinite(options.temperature):
-        raise UsageError(f"--temperature: got {options.temperature}, expected a number such as 0.7")
-    url = options.base_url or OPENAI
-    try:
-        parts = urlsplit(url)
-        known = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
-    except ValueError:
-        known = False
-    if not known:
-        raise UsageError(f"--base-url: got {url!r}, expected one such as http://localhost:8080/v1")
-    if parts.username is not None or parts.password is not None:
-        raise UsageError("--base-url: expected one without a name and a password, which logs would show")
-    key = os.environ.get(options.key_from, "")
-    if not key and parts.hostname not in _LOCAL:
-        raise UsageError(
-            f"{parts.hostname} asks for a key, and the environment has none in {options.key_from}; "
-            "export it, or name another variable with --key-from"
-        )
-    if not (key.strip().isascii() and key.strip().isprintable()):
-        raise UsageError(
-            f"--key-from: {options.key_from} holds more than the letters, digits and signs of a key"
-        )
-    model = agent.removeprefix(MODEL_PREFIX)
-    if not model:
-        raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
-    asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
-    prices = None if options.prices is None else prices_of(model, options.prices)
-    return Endpoint(model, url, key.strip(), asked, options.timeout, prices)
-
-
-def _is_unicode(text: str) -> bool:
-    """Whether a text is one that can be sent: bytes of a command line that are none become halves of characters."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
-    from socialai_dsl.llm.players import Budget
-
-    if text is None:
-        return Budget()
-    match = _BUDGET.fullmatch(text.strip())
-    amount = 0.0 if match is None else float(match[1].replace(",", "").replace("_", ""))
-    if match is None or not 0 < amount <= MOST_DOLLARS:
-        raise UsageError(
-            f"--budget: got {shortened(text)}, expected an amount such as 200000 or 2.50usd, above 0 and at most "
-            f"{MOST_DOLLARS:g}"
-        )
-    if (match[2] or "").lower() != "usd":
-        return Budget(tokens=int(amount))
-    if prices is None:
-        raise UsageError("--budget: an amount of money needs --prices to be counted")
-    return Budget(cost=amount)
 
 
 def _outcome(

@@ -225,7 +225,7 @@ def _options(cell: Cell, folder: Path) -> dict[str, Any]:
     if is_phases(options.get("curriculum")):
         options["curriculum"] = from_anywhere(options["curriculum"], folder)
     if "prices" in options.get("model", {}):
-        options["model"]["prices"] = prices_from_anywhere(cell, folder)
+        options["model"]["prices"] = prices_from_anywhere(str(cell.model["prices"]), folder)
     return options
 
 

@@ -31,7 +31,7 @@ from socialai_dsl.episodes.partners import Company
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, Step, TestEpisodes, at_once, play_async
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
 from socialai_dsl.episodes.results import Actions
-from socialai_dsl.llm.actions import ToolCall
+from socialai_dsl.llm.actions import Action, ToolCall
 from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import (
     CONTEXT,
@@ -586,7 +586,7 @@ class Conversation:
         seat: where an episode has begun.
         prompting: how the model plays.
         number: of the test episode.
-        path: of the transcript, a line of JSON for each reply.
+        path: of the transcript, a line of JSON for each reply; None where somebody else keeps what `record` returns.
         text: what is seen at the start.
         before: that of the trial before in the same session, which this one goes on with.
 
@@ -599,7 +599,7 @@ class Conversation:
         seat: TextSeat,
         prompting: PromptOptions,
         number: int,
-        path: Path,
+        path: Path | None,
         text: str,
         before: Conversation | None = None,
     ) -> None:
@@ -613,7 +613,7 @@ class Conversation:
         self._text = f"{closing}{prompting.heading(number % prompting.trials)}{text}"
         self._exchanges: list[list[Mapping[str, Any]]] = [] if before is None else [*before.exchanges]
         self._replies: list[list[tuple[str, str]]] = [[]]
-        self._records = _records(path)
+        self._records = iter(()) if path is None else _records(path)
         self._last: tuple[str, str, list[ToolCall]] = "", "", []
         self._is_full = self._appends = False
 
@@ -667,8 +667,8 @@ class Conversation:
             return {"response_format": {"type": "json_schema", "json_schema": schema}}
         return {"grammar": language.gbnf()} if self._prompting.grammar else {}
 
-    def write(self, answer: Answer) -> dict[str, Any]:
-        """Write an answer down; the record that stands in the transcript."""
+    def record(self, answer: Answer) -> dict[str, Any]:
+        """What a transcript has of an answer."""
         question = self._seat.question
         record: dict[str, Any] = {"observation": self._text, "reply": answer.text}
         if question is not None:
@@ -681,7 +681,12 @@ class Conversation:
         record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
         record |= {"reasoning_tokens": usage.reasoning} if usage.reasoning else {}
         record |= {"estimated": True} if usage.estimated else {}
-        record |= {"session": _SESSION, "time": datetime.now(UTC).isoformat(timespec="milliseconds")}
+        return record | {"session": _SESSION, "time": datetime.now(UTC).isoformat(timespec="milliseconds")}
+
+    def write(self, answer: Answer) -> dict[str, Any]:
+        """Write an answer down; the record that stands in the transcript."""
+        assert self._path is not None, "internal: there is a transcript"
+        record = self.record(answer)
         if not self._appends:  # before the first one, as reading changes nothing
             self._path.parent.mkdir(parents=True, exist_ok=True)
             _mend(self._path)
@@ -738,6 +743,10 @@ class Conversation:
         if decision.turn is not None:
             self.saw(decision.turn)
         return decision
+
+    def did(self, action: Action) -> None:
+        """Take it that somebody else has chosen on the seat: the model is shown that as a reply of its own."""
+        self._last = self._seat.language.write(action), "", []
 
     def saw(self, turn: Turn) -> None:
         """Remember what came of the reply that was read last."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Discriminator, Field, StringConstraints, Tag
 
+from socialai_dsl.schema.experiment import Asked
 from socialai_dsl.schema.holds import Holds
 from socialai_dsl.schema.scenario import (
     NOT_BLANK,
@@ -23,7 +24,10 @@ PERSON: Final = "person"
 """Who has a seat that a participant plays."""
 
 WHO: Final = (PERSON, "script", "random", "nobody")
-"""Who can have a seat without being a trained agent."""
+"""Who can have a seat without being an agent, a rival or a language model."""
+
+STANDING_IN: Final = WHO[1:]
+"""Who can stand in for a person, likewise."""
 
 _Told = Annotated[str, StringConstraints(pattern=NOT_BLANK, max_length=20_000)]
 Told = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
@@ -36,6 +40,18 @@ PageText = Annotated[_Told, as_written(_Told | float | bool), Holds("told")]
 """The name of a file that ends in .md, beside the study, or the text itself, both in Markdown."""
 
 Who = Annotated[str, StringConstraints(min_length=1, max_length=1000), Holds("spelt")]
+Seats = dict[Annotated[str, Holds("spelt")], Who]
+
+
+def _is_mapping(value: Any) -> str:
+    return "mapping" if isinstance(value, dict) else "word"
+
+
+StandIns = Annotated[
+    Annotated[Who, Tag("word")] | Annotated[Seats, Tag("mapping")], Discriminator(_is_mapping)
+]
+"""Who stands in for people: the same on all their seats, or by seat."""
+
 Tell = Literal["nothing", "instructions"]
 Seconds = Annotated[int, Field(ge=1, le=3600)]
 
@@ -109,19 +125,24 @@ class Block(Model):
     view: Literal["both", "picture", "words"] = Field(
         "both", description="the form in which participants get what their seat sees"
     )
-    seats: dict[Annotated[str, Holds("spelt")], Who] | None = Field(
+    seats: Seats | None = Field(
         None,
-        description="member of the cast: `person`, `script`, `random`, `nobody`, shipped:NAME, or a checkpoint or run "
-        "folder, relative to this file; the agent is a person unless said otherwise, the others follow their scripts",
+        description="member of the cast: `person`, `script`, `random`, `nobody`, shipped:NAME, a checkpoint or run "
+        "folder, relative to this file, llm:MODEL, or of the agent rival:NAME; the agent is a person unless said "
+        "otherwise, the others follow their scripts",
     )
     wait: Seconds = Field(
         120, description="seconds after which a seat is filled by `stands_in` if no other person has come"
     )
-    stands_in: Literal["script", "random", "nobody"] = Field(
-        "script", description="who takes the seat of a person who does not come, or leaves"
+    stands_in: StandIns = Field(
+        "script",
+        description="who takes the seat of a person who does not come, or leaves: as in `seats`, for all such seats "
+        "alike, or by member of the cast",
     )
     act_within: Seconds = Field(
-        60, description="seconds that others wait for an act; then `stands_in` plays that step"
+        60,
+        description="seconds that others wait for an act; then `stands_in` plays that step, and for a language model "
+        "the script plays to the end of the episode",
     )
     away: Annotated[int, Field(ge=2, le=600)] = Field(
         10, description="seconds without a sign of a participant's page, with which it counts as left"
@@ -214,6 +235,7 @@ class Study(Model):
     )
     practice: Practice | None = Field(None, description="episodes that do not count")
     blocks: Annotated[ListOf[Block], Field(min_length=1, max_length=50)] = Field(description="what is played")
+    model: Asked | None = Field(None, description="how language models on seats are asked")
     assign: Assign = Field(Assign(), description="who plays the blocks in which order")
     participants: int | None = Field(None, ge=1, le=100_000, description="how many may take part")
     questions: Questions = Field((), description="asked at the end")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking.briefing import Tell, brief
 from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.checking.studies import is_rival, is_trained
 from socialai_dsl.envs import ScenarioVectorEnv
 from socialai_dsl.envs.factory import compiled
+from socialai_dsl.envs.seats import RANDOM, SCRIPT
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat
+from socialai_dsl.episodes.policies import Observation
 from socialai_dsl.errors import OptionError
 from socialai_dsl.llm.view import LastStep, TextView
 from socialai_dsl.program import LOOKS, VIEW
@@ -41,11 +44,12 @@ class Arena:
         language: of the instructions, where they are written in it.
 
     Attributes:
+        loaded: see above. program: the same, compiled.
         seats: of the game. actions: the words for movements. briefing: what players are told of the task.
     """
 
     def __init__(self, loaded: Loaded, tell: Tell | None = None, language: str | None = None) -> None:
-        self.program = compiled(loaded)
+        self.loaded, self.program = loaded, compiled(loaded)
         self.seats = seats_of(self.program)
         self.actions = tuple(self.program.actions)
         try:
@@ -125,6 +129,11 @@ class Arena:
             known = self._spoken[member, said] = rooms.encoded((None, said)).tolist()
         return [first, *known[1:]]
 
+    def words(self, action: Action) -> tuple[str | None, str | None]:
+        """The movement and the sentence that an action means; None for standing still and for silence."""
+        said = self.program.sentences.text(action[2], action[3:]) if action[1] else None
+        return (*self.actions, None)[action[0]], said
+
     def seen(
         self,
         seat: Seat,
@@ -170,22 +179,27 @@ class Episode:
 
     Args:
         arena: where it is played.
-        players: of each seat that is not a person's nor a script's, a policy; see `Policy`.
+        players: of each seat that a trained agent may have, or take over, what makes a policy, see `Policy`; it is
+            asked for when the agent first acts, and then shown all that the seat has seen.
         reset: arguments of `env.reset`.
         env: what it is played in. observers: are told of all that happens.
+        about: what chance follows from besides the seat and the step.
 
     Attributes:
         t: steps so far. ending: None while it goes on. heard: of each seat, pairs of a step and a line.
+        acting: the policies that were asked for, by seat.
     """
 
     arena: Arena
-    players: Mapping[Seat, Any]
+    players: Mapping[Seat, Callable[[], Any]]
     reset: Mapping[str, Any]
     env: Any
     observers: Sequence[Observer] = ()
+    about: str = ""
     t: int = 0
     ending: Ending | None = None
     heard: dict[Seat, list[tuple[int, str]]] = field(default_factory=dict)
+    acting: dict[Seat, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.rooms = Rooms(self.env, self.observers)
@@ -194,38 +208,44 @@ class Episode:
         self.rooms.begin(self.reset)
         self._returns = dict.fromkeys(self.rooms.names, 0.0)
         self._last: dict[Seat, LastStep] = {}
+        self._own: dict[Seat, Action] = {}
+        self._unseen: dict[Seat, list[Observation]] = {seat: [] for seat in self.players}
         self.heard = {seat: [] for seat in self.arena.seats}
-        for player in self.players.values():
-            player.reset(np.ones(1, np.bool_))
-        self._own = self._asked()
+        self._look()
 
-    def _asked(self) -> dict[Seat, Action]:
-        """What the policies do in the next step."""
-        return {
-            seat: np.asarray(player.act(self.rooms.seen[seat]))[0].tolist()
-            for seat, player in self.players.items()
-        }
+    def _look(self) -> None:
+        """Keep what seats see now for the trained agents that have them, or may take them over."""
+        self._own = {}
+        for seat, unseen in self._unseen.items():
+            unseen.append({name: value.copy() for name, value in self.rooms.seen[seat].items()})
 
-    def chosen(self, seat: Seat, who: str, about: str) -> Action | None:
+    def _of_policy(self, seat: Seat) -> Action:
+        """What a trained agent does in the next step, which remembers the whole episode whoever acted before."""
+        if seat not in self.acting:
+            policy = self.acting[seat] = self.players[seat]()
+            policy.reset(np.ones(1, np.bool_), np.array([_number(f"{self.about} {seat}")]))
+        for seen in self._unseen[seat]:
+            self._own[seat] = np.asarray(self.acting[seat].act(seen))[0].tolist()
+        self._unseen[seat].clear()
+        return self._own[seat]
+
+    def chosen(self, seat: Seat, who: str) -> Action | None:
         """What somebody on a seat who is no person does in the next step; None where the member follows its frame.
 
         Args:
             seat: whose.
-            who: `script`, `random`, `nobody`, or anything else for the policy that has it.
-            about: what chance follows from besides the seat and the step.
+            who: `script`, `random`, `nobody`, a rival, or anything else for the trained agent that may have it.
         """
-        if seat in self.players:
-            return self._own[seat]
-        if who == "script" and seat != AGENT:
+        if who == SCRIPT and seat != AGENT:
             return None
-        if who == "script" and self.arena.scripted(AGENT):
+        if (who == SCRIPT or is_rival(who)) and self.arena.scripted(AGENT):
             found: Action = self.env.scripted_actions(AGENT)[0].tolist()
             return found
-        if who == "random":
-            drawn = hashlib.sha256(f"{about} {self.t} {seat}".encode()).digest()
+        if who == RANDOM:
+            drawn = hashlib.sha256(f"{self.about} {self.t} {seat}".encode()).digest()
             sizes = self.rooms.action_sizes
             return [int.from_bytes(drawn[4 * n : 4 * n + 4], "big") % size for n, size in enumerate(sizes)]
-        return self.arena.standing
+        return self._of_policy(seat) if is_trained(who) else self.arena.standing
 
     def step(self, acts: Acts) -> None:
         """Play a step.
@@ -252,8 +272,8 @@ class Episode:
         if step.ended[0]:
             outcome = self.arena.program.outcomes[int(step.outcome[0])]
             self.ending = Ending(str(outcome), success, dict(self._returns))
-        elif self.players:
-            self._own = self._asked()
+        else:
+            self._look()
 
     def _lines(self, seat: Seat) -> list[str]:
         utterance = self.rooms.heard(seat)["utterance"]
@@ -267,3 +287,8 @@ class Episode:
     def told(self, seat: Seat) -> str:
         """What whoever has a seat is told of the task."""
         return self.arena.told(seat, self.rooms.heard(seat).get("member"))
+
+
+def _number(about: str) -> int:
+    """A number of 63 bits that follows from a text."""
+    return int.from_bytes(hashlib.sha256(about.encode()).digest()[:8], "big") >> 1

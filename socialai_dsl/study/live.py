@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from markdown_it import MarkdownIt
 
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
+from socialai_dsl.checking.studies import (
+    PRACTICE,
+    LoadedStudy,
+    asked_by,
+    block_name,
+    is_model,
+    is_trained,
+    models_of,
+    persons_of,
+    players_of,
+    stand_ins_of,
+)
+from socialai_dsl.envs.seats import NOBODY, SCRIPT
 from socialai_dsl.episodes.play import Seat
 from socialai_dsl.errors import UsageError
-from socialai_dsl.schema.study import PERSON, WHO, Question
+from socialai_dsl.schema.study import PERSON, Question
 from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
 from socialai_dsl.study.replay import Row, header_of, reset_of, study_file, tell_of
 from socialai_dsl.trainer.shipped import PREFIX
+
+if TYPE_CHECKING:  # it needs httpx, which is only there if language models were asked for
+    from socialai_dsl.study.models import Endpoints, Thinking
 
 MOST_LINES: Final = 200
 """How many of the last lines that were heard a page shows."""
@@ -77,12 +95,15 @@ class Running:
 
     Attributes:
         episode: the present one. chosen: of each seat of a person who has chosen. since: when the first one did.
+        late: whether the others are not waited for any more in this step. thinking: the language models, if some play.
         ready: participants who want to go on after the end of an episode. ended: when it ended.
     """
 
     episode: Episode
     chosen: dict[Seat, Choice] = field(default_factory=dict)
     since: float | None = None
+    late: bool = False
+    thinking: Thinking | None = None
     ready: set[str] = field(default_factory=set)
     ended: float | None = None
 
@@ -127,7 +148,14 @@ class Live:
         self._waiting: dict[int, dict[str, float]] = {}
         self._markdown = MarkdownIt("commonmark", {"html": False, "breaks": False})
         self.progress = Progress(loaded)
+        self._policies: defaultdict[tuple[int, Seat], list[Any]] = defaultdict(list)
         self._check_agents()
+        self._endpoints = self._asked_models()
+        self._watched = {
+            number
+            for number, block in enumerate(self._study.blocks)
+            if len(persons_of(block)) > 1 or any(map(is_model, players_of(block).values()))
+        }
         self._began = clock()
         self._left: dict[str, float] = {}  # when a page was closed that this server had
         known = self._read() if self._file.exists() and self._file.stat().st_size else 0
@@ -165,10 +193,12 @@ class Live:
         if bool(event.get("simulated")) != self._simulated:
             was = "a rehearsal" if event.get("simulated") else "what people have done"
             raise UsageError(f"{self._file}: holds {was}, and simulated participants stay apart from people")
-        changed = [name for name, sha in own["programs"].items() if event["programs"].get(name) != sha]
+        names = {block_name(self._loaded, number): one.name for number, one in self._loaded.played.items()}
+        was = event["programs"]
+        changed = {names[block] for block, sha in own["programs"].items() if was.get(block) != sha}
         if changed:
             raise UsageError(
-                f"{self._file}: was begun with another version of {', '.join(sorted(set(changed)))}; what people have "
+                f"{self._file}: was begun with another version of {', '.join(sorted(changed))}; what people have "
                 "played and what they would play must not differ. Take the change back, or begin a new study with --out"
             )
         if event["digest"] != own["digest"]:
@@ -201,6 +231,9 @@ class Live:
 
     def _forget(self) -> None:
         """Be where the disk says, after something could not be stored."""
+        for running in self._running.values():
+            if running.thinking is not None:
+                running.thinking.stop()
         self._running.clear()
         self._waiting.clear()
         self._read()
@@ -212,6 +245,11 @@ class Live:
 
     async def close(self) -> None:
         """Store what is left, and let the log go."""
+        for running in self._running.values():
+            if running.thinking is not None:
+                running.thinking.stop()
+        if self._endpoints is not None:
+            await self._endpoints.close()
         with suppress(OSError):
             await self._log.flushed()
         self._log.close()
@@ -387,8 +425,13 @@ class Live:
     def _drop(self, game: Game) -> None:
         """Give back what a game was played in."""
         running = self._running.pop(game.id, None)
-        if running is not None:
-            self.arenas[game.block].give(running.episode.env)
+        if running is None:
+            return
+        self.arenas[game.block].give(running.episode.env)
+        for seat, policy in running.episode.acting.items():
+            self._policies[game.block, seat].append(policy)
+        if running.thinking is not None:
+            running.thinking.stop()
 
     def _running_of(self, game: Game) -> Running:
         """A game as it is played now; after a new start it is played again as far as it was."""
@@ -397,35 +440,71 @@ class Live:
             arena, played = self.arenas[game.block], game.episode
             assert played is not None, "internal: a game begins with an episode"
             env = arena.take()
-            episode = Episode(arena, self._policies(game.seats, env), reset_of(game.block, played.room), env)
+            thinking = self._thinking_of(game.block)
+            watching = () if thinking is None else tuple(thinking.seats.values())
+            episode = Episode(
+                arena,
+                self._agents_of(game.block, env),
+                reset_of(game.block, played.room),
+                env,
+                watching,
+                f"{game.id} {played.number}",
+            )
             for step in played.steps:
+                if thinking is not None:
+                    thinking.again(step.get("replies", {}), step.get("missed", {}))
                 episode.step(step["acts"])
-            found = self._running[game.id] = Running(episode)
+            found = self._running[game.id] = Running(episode, thinking=thinking)
             if episode.ending is not None and played.ended is None:  # the server died in between
                 self._end(game, found)
         return found
 
     def _check_agents(self) -> None:
         """See that the trained agents that are named can sit where they are to. Raises UsageError."""
-        for number, block in enumerate(self._study.blocks):
+        for number in range(len(self._study.blocks)):
             env = self.arenas[number].take()
             try:
-                self._policies(seats_of(block), env)
+                for seat, make in self._agents_of(number, env).items():
+                    self._policies[number, seat].append(make())
             except ValueError as error:
                 raise UsageError(f"block {number + 1}: {error}") from None
             self.arenas[number].give(env)
 
-    def _policies(self, seats: Mapping[Seat, str], env: Any) -> dict[Seat, Any]:
-        """The trained agents on seats."""
-        named = {seat: who for seat, who in seats.items() if who not in (*WHO, *self.progress.people)}
-        if not named:
-            return {}
-        from socialai_dsl.episodes.players import Player, make_policy, require_trainer
+    def _others(self, block: int) -> dict[Seat, str]:
+        """Who may choose the acts of seats in a block besides people."""
+        return {} if block == PRACTICE else players_of(self._study.blocks[block])
 
-        require_trainer()
-        folder = self._loaded.folder
-        paths = {seat: who if who.startswith(PREFIX) else str(folder / who) for seat, who in named.items()}
-        return {seat: make_policy(Player(path), env)[0] for seat, path in paths.items()}
+    def _agents_of(self, block: int, env: Any) -> dict[Seat, Callable[[], Any]]:
+        """What makes the trained agents that may play in a block; one that is free is taken again."""
+
+        def make(seat: Seat, who: str) -> Any:
+            free = self._policies[block, seat]
+            return free.pop() if free else agent_of(who, self._loaded.folder, env)
+
+        trained = {seat: who for seat, who in self._others(block).items() if is_trained(who)}
+        return {seat: partial(make, seat, who) for seat, who in trained.items()}
+
+    def _asked_models(self) -> Endpoints | None:
+        """Where the language models of the study are asked; None if it has none. Raises UsageError."""
+        named = models_of(self._study)
+        if not named:
+            return None
+        if find_spec("httpx") is None:
+            raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
+        from socialai_dsl.study.models import Endpoints
+
+        return Endpoints(named, asked_by(self._study, self._loaded.folder))
+
+    def _thinking_of(self, block: int) -> Thinking | None:
+        """The language models that may play in a game of a block; None if there are none."""
+        models = {seat: who for seat, who in self._others(block).items() if is_model(who)}
+        if not models or self._endpoints is None:
+            return None
+        from socialai_dsl.study.models import ModelSeat, Thinking
+
+        arena, endpoints = self.arenas[block], self._endpoints
+        seats = {seat: ModelSeat(arena, seat, who, endpoints) for seat, who in models.items()}
+        return Thinking(seats, self._study.blocks[block].act_within)
 
     def _act(self, person: Participant, page: Page, message: Act) -> Iterable[str]:
         game = self.progress.games[person.game or ""]
@@ -447,21 +526,60 @@ class Live:
         people = self.progress.people
         return {seat: who for seat, who in game.seats.items() if who in people and who not in game.gone}
 
-    def _advance(self, game: Game, late: bool = False) -> Iterable[str]:
+    def _acting(self, game: Game, running: Running) -> dict[Seat, str]:
+        """Who chooses the acts of the seats in the next step on which no person has chosen."""
+        stand_ins = {} if game.block == PRACTICE else stand_ins_of(self._study.blocks[game.block])
+        acting = {}
+        for seat in running.episode.arena.seats:
+            who = game.seats.get(seat, SCRIPT)
+            if seat not in running.chosen:
+                acting[seat] = stand_ins[seat] if who in self.progress.people else who
+        return acting
+
+    def _missed(self, running: Running, acting: dict[Seat, str]) -> dict[Seat, str]:
+        """Why language models do not act that should; `acting` gets who does instead."""
+        missed = {} if running.thinking is None else running.thinking.out
+        found = {seat: missed[seat] for seat, who in acting.items() if is_model(who) and seat in missed}
+        acting |= {seat: SCRIPT if running.episode.arena.scripted(seat) else NOBODY for seat in found}
+        return found
+
+    def _ask(self, game: Game, running: Running, seats: Iterable[Seat]) -> None:
+        """Ask language models what they do in the next step."""
+
+        async def then() -> None:
+            if self._running.get(game.id) is running:
+                await self._show(self._advance(game))
+
+        assert running.thinking is not None, "internal: language models play"
+        for seat in seats:
+            running.thinking.ask(seat, self._clock(), then)
+
+    def _advance(self, game: Game) -> Iterable[str]:
         """Play the step if nobody is waited for any more; who sees something new."""
         running, persons = self._running_of(game), self._persons(game)
         if running.episode.ending is not None or not running.chosen:
             return ()
-        if not late and any(seat not in running.chosen for seat in persons):
-            running.since = running.since or self._clock()
+        if running.since is None:
+            running.since = self._clock()
+        if not running.late and any(seat not in running.chosen for seat in persons):
             return ()
+        acting = self._acting(game, running)
+        missed = self._missed(running, acting)
+        models = [seat for seat, who in acting.items() if is_model(who)]
+        replies: dict[Seat, tuple[list[dict[str, Any]], Action]] = {}
+        if models and running.thinking is not None:
+            replies = {
+                seat: running.thinking.ready[seat] for seat in models if seat in running.thinking.ready
+            }
+            if len(replies) < len(models):
+                self._ask(game, running, models)
+                return ()
         episode = running.episode
         acts: dict[Seat, Action | None] = {}
         by: dict[Seat, str] = {}
         times: dict[Seat, dict[str, Any]] = {}
-        stands_in = "script" if game.block == PRACTICE else self._study.blocks[game.block].stands_in
         for seat in episode.arena.seats:
-            choice, who = running.chosen.get(seat), game.seats.get(seat, "script")
+            choice = running.chosen.get(seat)
             if choice is not None:
                 acts[seat], by[seat] = choice.action, PERSON
                 times[seat] = {
@@ -472,14 +590,30 @@ class Live:
                     "said": choice.said,
                 }
                 continue
-            by[seat] = stands_in if who in self.progress.people else who
-            acts[seat] = episode.chosen(seat, by[seat], f"{game.id} {len(game.results)}")
-        self._do("step", game=game.id, episode=len(game.results), t=episode.t, acts=acts, by=by, times=times)
+            by[seat] = acting[seat]
+            acts[seat] = replies[seat][1] if seat in replies else episode.chosen(seat, by[seat])
+        more: dict[str, Any] = (
+            {"replies": {seat: said for seat, (said, _) in replies.items()}} if replies else {}
+        )
+        more |= {"missed": missed} if missed else {}
+        place = {"game": game.id, "episode": len(game.results), "t": episode.t}
+        self._do("step", **place, acts=acts, by=by, times=times, **more)
+        if running.thinking is not None:
+            running.thinking.step(replies)
         episode.step(acts)
-        running.chosen, running.since = {}, None
+        running.chosen, running.since, running.late = {}, None, False
         if episode.ending is not None:
             self._end(game, running)
+        else:
+            self._think_ahead(game, running)
         return persons.values()
+
+    def _think_ahead(self, game: Game, running: Running) -> None:
+        """Ask the language models that have their seats to themselves while people look at the picture."""
+        if running.thinking is not None and running.episode.ending is None and self._persons(game):
+            out = running.thinking.out
+            own = [seat for seat, who in game.seats.items() if is_model(who) and seat not in out]
+            self._ask(game, running, own)
 
     def _end(self, game: Game, running: Running) -> None:
         ending = running.episode.ending
@@ -519,7 +653,7 @@ class Live:
         for block, waiting in self._waiting.items():
             told += self._match(block, waiting)
         for game in tuple(self.progress.games.values()):
-            if game.block != PRACTICE and len(persons_of(self._study.blocks[game.block])) > 1:
+            if game.block in self._watched:
                 told += self._watch(game)
         if told:
             await self._show(told)
@@ -547,8 +681,8 @@ class Live:
             return []
         told: list[str] = []
         for who in game.seats.values():
-            if who not in self.progress.people:
-                continue
+            if who not in self.progress.people or not stand_ins_of(study):
+                continue  # who plays without others is waited for
             there = self.is_there(who, study.away)
             if not there and who not in game.gone:
                 self._do("gone", game=game.id, participant=who)
@@ -560,8 +694,12 @@ class Live:
         running = self._running.get(game.id)
         if not persons or running is None:
             return told
-        if running.since is not None and now - running.since >= study.act_within:
-            told += self._advance(game, late=True)
+        self._think_ahead(game, running)
+        if running.since is not None:
+            waited_for = running.thinking is not None and running.thinking.give_up(now, running.since)
+            if now - running.since >= study.act_within and not running.late:
+                running.late = waited_for = True
+            told += self._advance(game) if waited_for else ()
         waited = running.ended is not None and now - running.ended >= study.act_within
         if running.ready and (waited or set(persons.values()) <= running.ready):
             self._next_episode(game)
@@ -708,6 +846,27 @@ class Live:
         for number, name in enumerate(self._loaded.pictures):
             made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
         return made
+
+
+def agent_of(who: str, folder: Path, env: Any) -> Any:
+    """The policy of a trained agent.
+
+    Args:
+        who: `shipped:NAME`, or the path of a checkpoint or a run's folder, relative to the folder of the study's file.
+        folder: see above.
+        env: what it is to play.
+
+    Raises:
+        UsageError: the trainer is not installed, or somebody else played in the folder.
+        ValueError: the agent does not fit.
+    """
+    from socialai_dsl.episodes.players import Player, make_policy, played_again, require_trainer
+
+    require_trainer()
+    player = Player(played_again(who if who.startswith(PREFIX) else str(folder / who)))
+    if not player.is_trained:
+        raise UsageError(f"{who}: {player.agent!r} played there, expected a trained agent")
+    return make_policy(player, env)[0]
 
 
 def _fits(question: Question, answer: str | int) -> bool:

@@ -6,8 +6,7 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of
-from socialai_dsl.schema.study import PERSON
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of, stand_ins_of
 from socialai_dsl.semantics.study import least_filled, shuffled
 from socialai_dsl.study.log import Event
 
@@ -170,9 +169,9 @@ class Progress:
         seats, persons = seats_of(self.study.blocks[block]), persons_of(self.study.blocks[block])
         before = sum(game.block == block for game in self.games.values())
         turned = [*persons[before % len(persons) :], *persons[: before % len(persons)]]
-        stands_in = self.study.blocks[block].stands_in
         taken = dict(zip(turned, people, strict=False))
-        return {seat: taken.get(seat, stands_in if who == PERSON else who) for seat, who in seats.items()}
+        others = seats | stand_ins_of(self.study.blocks[block])
+        return {seat: taken.get(seat, others[seat]) for seat in seats}
 
     def is_over(self, game: Game) -> bool:
         """Whether all episodes of a game have ended."""

@@ -21,13 +21,13 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from socialai_dsl.checking.loaded import unscripted
-from socialai_dsl.checking.studies import LoadedStudy, persons_of
+from socialai_dsl.checking.studies import LoadedStudy, block_name, persons_of
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import closest_script
 from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Arena, Episode
 from socialai_dsl.study.messages import Screen
-from socialai_dsl.study.replay import StudyData, block_name, reset_of, study_data
+from socialai_dsl.study.replay import StudyData, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of
 
@@ -335,8 +335,5 @@ class Simulated:
         episode = self._mirror[1]
         for step in game.episode.steps[episode.t :]:
             episode.step(step["acts"])
-        action = episode.chosen("agent", "script", "")
-        if action is None or episode.ending is not None:
-            return None
-        movement = (*arena.actions, None)[action[0]]
-        return movement, arena.program.sentences.text(action[2], action[3:]) if action[1] else None
+        action = episode.chosen("agent", "script")
+        return None if action is None or episode.ending is not None else arena.words(action)

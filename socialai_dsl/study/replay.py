@@ -13,7 +13,7 @@ from statistics import median
 from typing import Any
 
 from socialai_dsl.checking.briefing import Tell
-from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, scripts_agent
+from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, block_name, rival_of_agent, scripts_agent
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.asking import Asking
 from socialai_dsl.errors import UnreadableError, UsageError
@@ -145,8 +145,9 @@ class _Tables:
 
     def _block(self, number: int) -> PlayedBlock:
         block, name = self._loaded.study.blocks[number], self._names[number]
-        # Where a script may stand in for the agent, what is played has a frame for it, and is the same otherwise.
-        meant = load(name) if scripts_agent(block) else self._loaded.played[number]
+        # Where a script or a rival may play the agent, what is played has a frame for it, and is the same otherwise.
+        framed = scripts_agent(block) or rival_of_agent(block) is not None
+        meant = load(name) if framed else self._loaded.played[number]
         program = compiled(meant)
         return PlayedBlock(
             block_name(self._loaded, number),
@@ -218,6 +219,8 @@ class _Tables:
                     "heard": "\n".join(line for t, line in episode.heard[seat] if t == episode.t),
                     "action": "" if action is None else " ".join(map(str, action)),
                     **done_on(seat, event, episode.arena.actions),
+                    "reply": "\n".join(one["reply"] for one in event.get("replies", {}).get(seat, ())),
+                    "missed": event.get("missed", {}).get(seat, ""),
                     "mono": event["mono"],
                     "server": self._server,
                 }
@@ -334,13 +337,6 @@ class _Tables:
             yield f"faster than {rules.faster_than} ms"
 
 
-def block_name(loaded: LoadedStudy, number: int) -> str:
-    """What a block, or practice, is called in the tables."""
-    if number == PRACTICE:
-        return "practice"
-    return loaded.study.blocks[number].name or f"{loaded.played[number].name}_{number + 1}"
-
-
 def reset_of(block: int, room: int) -> dict[str, Any]:
     """The arguments of `env.reset` for a room of a block."""
     return {"seed": room} if block == PRACTICE else {"options": {"test_episode": [room]}}
@@ -357,7 +353,7 @@ def header_of(loaded: LoadedStudy, arenas: Mapping[int, Arena]) -> dict[str, Any
     """What the first event of a log says of the study, whoever takes part, and wherever it lies."""
     words = [loaded.study.model_dump(mode="json"), loaded.consent, loaded.instructions]
     digest = hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
-    programs = {loaded.played[number].name: arena.program.sha256 for number, arena in arenas.items()}
+    programs = {block_name(loaded, number): arena.program.sha256 for number, arena in arenas.items()}
     return {"format": FORMAT, "study": loaded.study.study, "digest": digest, "programs": programs}
 
 

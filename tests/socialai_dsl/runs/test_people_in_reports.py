@@ -332,7 +332,7 @@ def test_a_study_of_another_version_of_its_scenarios_is_left_out(
 ) -> None:
     log = copied / "asking_rehearsal" / "log.jsonl"
     text = log.read_text(encoding="utf-8")
-    digest = json.loads(text.split("\n")[0])["programs"]["talkitout"]
+    digest = json.loads(text.split("\n")[0])["programs"]["guides"]
     log.write_text(text.replace(digest, "0" * 64), encoding="utf-8")
     (told,) = remarks_of(place, [log.parent], capsys, copied / "report")
     assert "is of another study, or of other versions of its scenarios" in told

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 from collections import Counter
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -12,7 +13,10 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UnreadableError, UsageError
+from socialai_dsl.frontend import load_study
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.study import log
 from socialai_dsl.study.columns import COLUMNS
 from socialai_dsl.study.data import write_data
@@ -30,6 +34,8 @@ from tests.socialai_dsl.study.participants import (
     run,
     until,
 )
+
+SHIPPED = shipped_folder()
 
 
 async def play_on(one: Taking, rng: random.Random, most: int = 10_000) -> None:
@@ -272,6 +278,50 @@ def test_a_study_that_was_changed_is_not_gone_on_with(whole: bytes, place: Path,
         with pytest.raises(UsageError, match=why):
             Live(loaded_study(text, place), tmp_path)
     assert (tmp_path / FILE).read_bytes() == whole, "nothing was written"
+
+
+def test_each_of_two_scenarios_of_one_name_has_to_be_as_it_was(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        shutil.copy(SHIPPED / "talkitout_no_liar.yaml", tmp_path / folder / "talk.yaml")
+    blocks = "".join(f"- {{scenario: {folder}/talk.yaml, episodes: 1}}\n" for folder in ("one", "two"))
+    text = f"study: twice\nconsent: I agree.\nblocks:\n{blocks}"
+    (tmp_path / "study.yaml").write_text(text, encoding="utf-8")
+    out = tmp_path / "out"
+    out.mkdir()
+
+    def begin() -> None:
+        async def open_and_close() -> None:
+            await Live(load_study(tmp_path / "study.yaml"), out).close()
+
+        run(open_and_close)
+
+    begin()
+    begin()
+    changed = (SHIPPED / "talkitout.yaml").read_text(encoding="utf-8")
+    for folder in ("one", "two"):
+        file = tmp_path / folder / "talk.yaml"
+        before = file.read_text(encoding="utf-8")
+        file.write_text(changed, encoding="utf-8")
+        with pytest.raises(UsageError, match="another version of"):
+            begin()
+        file.write_text(before, encoding="utf-8")
+    begin()
+
+
+@pytest.mark.parametrize("names", [("same", "same"), ("practice", "other"), ("talkitout_2", None)])
+def test_blocks_that_the_data_could_not_tell_apart_are_a_finding(
+    names: tuple[str | None, ...], tmp_path: Path
+) -> None:
+    blocks = "".join(
+        f"- {{scenario: talkitout, episodes: 1{'' if name is None else f', name: {name}'}}}\n"
+        for name in names
+    )
+    file = tmp_path / "study.yaml"
+    file.write_text(f"study: s\nconsent: I agree.\nblocks:\n{blocks}", encoding="utf-8")
+    with pytest.raises(ScenarioError) as caught:
+        load_study(file)
+    assert [finding.code for finding in caught.value.diagnostics] == ["S213"]
 
 
 @pytest.mark.parametrize(

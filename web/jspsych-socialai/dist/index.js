@@ -910,7 +910,7 @@ var en = {
   success: "That was a success.",
   failure: "That was no success.",
   over: "This round is over.",
-  waiting: "You have chosen. The other person is still choosing.",
+  waiting: "You have chosen. Others are still choosing.",
   room: "Waiting for another person. If nobody comes it goes on without one.",
   room_left: "At most {number} seconds.",
   ready: "Waiting for the other person.",
