@@ -20,6 +20,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.model_options import MODEL_OPTIONS, add_options
 from socialai_dsl.cli.terminal import json_text
 from socialai_dsl.episodes.partners import called
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 from socialai_dsl.evaluation.test_set import Evaluation
@@ -31,6 +32,7 @@ SUMMARY: Final = "test a trained agent, a script, chance or a language model on 
 EXAMPLES: Final = (
     ("socialai evaluate runs/gate --episodes 20", "a run of yours"),
     ("socialai evaluate oracle --on talkitout --episodes 20", "the script"),
+    ("socialai evaluate shipped:talkitout --rooms seed:1 --episodes 100", "rooms beside the test set"),
     ("socialai evaluate llm:MODEL --on talkitout --base-url http://localhost:8080/v1", "a language model"),
 )
 
@@ -62,7 +64,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the scenario to play (repeatable; default: that of the run)",
     )
     parser.add_argument(
-        "--episodes", type=episodes, default=500, metavar="N", help="number of test episodes (default: 500)"
+        "--episodes",
+        type=episodes,
+        metavar="N",
+        help="number of episodes (default: 500, or all rooms of a file)",
+    )
+    parser.add_argument(
+        "--rooms",
+        default="test",
+        metavar="test|seed:N|FILE",
+        help="the rooms: the test set (default), those of a seed, or a JSON or YAML file with a list of layouts, "
+        "a room each",
     )
     parser.add_argument(
         "--greedy",
@@ -74,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=seed,
         metavar="N",
-        help="seed of the sampling (default: 0); the rooms are always the same",
+        help="seed of the sampling (default: 0); it does not change the rooms, see --rooms",
     )
     parser.add_argument(
         "--device",
@@ -129,7 +141,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     player, seats = made_players(agent, arguments.seat, scenarios, typed_options(arguments, _OPTIONS), out)
     recorded = RECORDED if arguments.record is None else arguments.record
     results = []
-    asked = arguments.episodes, recorded, out, arguments.trials, seats
+    asked = arguments.episodes, recorded, out, arguments.trials, seats, RoomSet.named(arguments.rooms)
     for evaluation in evaluate_each(player, scenarios, *asked):
         results.append(result_of(evaluation))
         for warning in evaluation.warnings:

@@ -90,6 +90,15 @@ def reset_arguments(
     return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})
 
 
+def origin(reset: Mapping[str, Any]) -> str:
+    """Which episode the arguments of `env.reset` begin, in words."""
+    options = reset["options"] or {}
+    if "test_episode" in options:
+        return f"test episode {options['test_episode']}"
+    room = f", room {options['index']}" if "index" in options else ""
+    return f"seed {reset['seed']}{room}"
+
+
 def each(what: str, given: Any, count: int, highest: int, or_none: bool = False) -> list[int | None]:
     """One number for each environment, from one for all or a list.
 

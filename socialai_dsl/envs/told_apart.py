@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,9 @@ from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 
 Value = tuple[str, str]
 """A draw and its value: `("condition", "test")`; of a member of a suite `("dance: length", "3")`."""
+
+Begin = Callable[[int], Mapping[str, Any]]
+"""Number of a room -> the arguments of `env.reset` that begin an episode there."""
 
 _NOTHING: Final = "none"
 
@@ -32,8 +35,10 @@ def _spelt(value: Any) -> str:
     return _NOTHING if value is None else str(value)
 
 
-def of_test_episodes(loaded: Loaded, program: Playable, episodes: int) -> dict[Value, NDArray[np.int64]]:
-    """In which of test episodes 0 to `episodes - 1` each draw has each value: their numbers, by draw and value.
+def of_rooms(
+    loaded: Loaded, program: Playable, begin: Begin, episodes: int
+) -> dict[Value, NDArray[np.int64]]:
+    """In which of the rooms 0 to `episodes - 1` each draw has each value: their numbers, by draw and value.
 
     Nothing where the scenario does not have its results told apart, and of acts in a row, which have a room each.
     """
@@ -44,14 +49,16 @@ def of_test_episodes(loaded: Loaded, program: Playable, episodes: int) -> dict[V
     else:
         members = zip(loaded.member_names, loaded.members, strict=True)
         draws = {name: member.checked.results_by for name, member in members}
-    return rooms_apart(_test_rooms(program, episodes, draws)) if any(draws.values()) else {}
+    return rooms_apart(_values(program, begin, episodes, draws)) if any(draws.values()) else {}
 
 
-def _test_rooms(program: Playable, episodes: int, draws: dict[str, tuple[str, ...]]) -> Iterator[list[Value]]:
+def _values(
+    program: Playable, begin: Begin, episodes: int, draws: dict[str, tuple[str, ...]]
+) -> Iterator[list[Value]]:
     env = ScenarioEnv(program)
     try:
         for number in range(episodes):
-            env.reset(options={"test_episode": number})
+            env.reset(**begin(number))
             described = env.describe()
             member = described["member"] if isinstance(program, ProgramSuite) else None
             yield values_apart(described, draws[member or ""], member)

@@ -11,13 +11,12 @@ from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.play import (
     AGENT,
     Agenda,
+    EachRoom,
     EpisodesInARow,
     Observer,
     OneEpisode,
     Rooms,
-    SeededRooms,
     Step,
-    TestEpisodes,
     play,
     play_async,
 )
@@ -36,6 +35,7 @@ from socialai_dsl.episodes.policies import (
     Streams,
 )
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.episodes.stage import Stage
 from socialai_dsl.episodes.traces import Tracing, trace_of
 from socialai_dsl.model_options import ModelOptions
@@ -44,6 +44,7 @@ __all__ = [
     "AGENT",
     "Actions",
     "Agenda",
+    "EachRoom",
     "EpisodeOver",
     "EpisodesInARow",
     "EvalResult",
@@ -61,13 +62,12 @@ __all__ = [
     "RecordedEpisode",
     "ReplayedPolicy",
     "Results",
+    "RoomSet",
     "Rooms",
     "ScriptedPolicy",
-    "SeededRooms",
     "Stage",
     "Step",
     "Streams",
-    "TestEpisodes",
     "Tracing",
     "film",
     "play",

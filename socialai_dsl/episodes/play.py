@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.envs.scenario_env import encode_action
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.program_suite import ProgramSuite, outcome_name
 
 Bools = NDArray[np.bool_]
@@ -295,11 +296,25 @@ class Agenda(Protocol):
         """The arguments of `env.reset` that begin these episodes, int64 (E,), where `begun`, bool (E,)."""
 
 
-class _Queue:
-    """Episodes 0 to N - 1, each once: a room plays the next that are left, a session of trials in a row."""
+class EachRoom:
+    """Rooms 0 to N - 1 of a set, an episode in each: whoever is free plays the next session that is left.
 
-    def __init__(self, episodes: int, trials: int = 1, sessions: Iterator[int] | None = None) -> None:
+    Args:
+        episodes: N.
+        trials: how many rooms in a row are a session.
+        sessions: the first rooms of the sessions that are left, where several agendas share them.
+        rooms: the set; by default the test set.
+    """
+
+    def __init__(
+        self,
+        episodes: int,
+        trials: int = 1,
+        sessions: Iterator[int] | None = None,
+        rooms: RoomSet = TEST_ROOMS,
+    ) -> None:
         self.trials = trials
+        self._rooms = rooms
         self._waiting = iter(range(0, episodes, trials)) if sessions is None else sessions
         self._next: dict[int, int] = {}
 
@@ -314,33 +329,9 @@ class _Queue:
         self._next[room] = number + 1
         return number
 
-
-class TestEpisodes(_Queue):
-    """Episodes 0 to N - 1 of the test set, as many in a row as there are trials in a session.
-
-    Args:
-        episodes: N.
-        trials: how many in a row.
-        sessions: the first episodes of the sessions that are left, where several agendas share them.
-    """
-
-    __test__ = False  # pytest takes it for a test
-
     def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
         """See `Agenda.reset`."""
-        return {"options": {"reset_mask": begun, "test_episode": numbers.tolist()}}
-
-
-class SeededRooms(_Queue):
-    """Rooms 0 to N - 1 of a seed, an episode in each."""
-
-    def __init__(self, seed: int, episodes: int) -> None:
-        super().__init__(episodes)
-        self._seed = seed
-
-    def reset(self, begun: Bools, numbers: Int64) -> dict[str, Any]:
-        """See `Agenda.reset`."""
-        return {"seed": self._seed, "options": {"reset_mask": begun, "index": numbers.tolist()}}
+        return self._rooms.reset_many(begun, numbers)
 
 
 class EpisodesInARow:

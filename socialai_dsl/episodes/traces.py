@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking.loaded import about_of
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.envs.factory import compiled, make_loaded
-from socialai_dsl.envs.options import reset_arguments
+from socialai_dsl.envs.options import origin, reset_arguments
 from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.episodes.partners import (
     acts_of_others,
@@ -297,7 +297,7 @@ class TracedEpisode:
 
     def origin(self) -> str:
         """Which episode it is, in words."""
-        return _origin(self._reset)
+        return origin(self._reset)
 
     def document(self) -> Trace:
         """What was played so far, as a trace: played again, without the script."""
@@ -358,12 +358,3 @@ class _OfOthers(Observer):
     def stepped(self, rooms: Rooms, step: Step) -> None:
         """See `Observer.stepped`."""
         self.played.append(acts_of_others(rooms.env))
-
-
-def _origin(reset: dict[str, Any]) -> str:
-    """Which episode it is, in words."""
-    options = reset["options"] or {}
-    if "test_episode" in options:
-        return f"test episode {options['test_episode']}"
-    room = f", room {options['index']}" if "index" in options else ""
-    return f"seed {reset['seed']}{room}"

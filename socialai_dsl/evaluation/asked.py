@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.envs.factory import make_vec
 from socialai_dsl.episodes.asking import Answer, Asking
-from socialai_dsl.episodes.play import Rooms, TestEpisodes, play
+from socialai_dsl.episodes.play import EachRoom, Rooms, play
 from socialai_dsl.episodes.policies import Observation
 from socialai_dsl.evaluation.test_set import TOGETHER, Evaluation
 from socialai_dsl.program_suite import seats_of
@@ -38,7 +38,7 @@ def asked_in(evaluation: Evaluation) -> tuple[list[list[Answer]], list[int]]:
         still = np.zeros(len(rooms.action_sizes), np.int64)
         still[0] = len(program.actions)
         again = {seat: _Again(evaluation.actions, seats.index(seat), still) for seat in rooms.seats}
-        play(rooms, again, TestEpisodes(count))
+        play(rooms, again, EachRoom(count, rooms=evaluation.rooms))
     finally:
         envs.close()
     steps = {number: len(actions) for number, actions in evaluation.actions.items()}

@@ -16,8 +16,9 @@ from socialai_dsl.analysis.tally import Part, Tally, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.factory import make_vec
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
+from socialai_dsl.episodes.play import AGENT, EachRoom, Observer, Rooms, Step, play
 from socialai_dsl.episodes.players import Player, make_policy, named_agent, played_again, require_trainer
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.episodes.scripts import script_of, with_frame_of
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
@@ -99,7 +100,12 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
             return clock.is_over
 
         with clock.until_interrupted():
-            play(Rooms(envs, [counting]), {AGENT: policy}, SeededRooms(seed, episodes), over)
+            play(
+                Rooms(envs, [counting]),
+                {AGENT: policy},
+                EachRoom(episodes, rooms=RoomSet.of_seed(seed)),
+                over,
+            )
         return counting.watch.tally(counting.ended)
     except ValueError as error:
         raise UsageError(str(error)) from error

@@ -20,6 +20,7 @@ from socialai_dsl.episodes.partners import company, sitting
 from socialai_dsl.episodes.play import AGENT, Seat
 from socialai_dsl.episodes.players import Player
 from socialai_dsl.episodes.results import EvalResult
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.llm.prompting import PromptOptions
@@ -66,6 +67,7 @@ def let_models_play(
     episodes: int,
     out: Path,
     trials: int = 1,
+    rooms: RoomSet = TEST_ROOMS,
 ) -> ModelEpisodes:
     """Let players, models among them, play test episodes 0 to `episodes - 1`; answers in transcripts are not asked for.
 
@@ -78,6 +80,7 @@ def let_models_play(
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
         trials: how many episodes in a row are one conversation.
+        rooms: which are played; the test set by default.
 
     Raises:
         UsageError: an endpoint does not answer, or an option is not what was expected.
@@ -97,6 +100,7 @@ def let_models_play(
     words = _words(players, program) if len(players) > 1 else {}
     about: dict[str, Any] = {"scenario": scenario, "program_sha256": program.sha256, "trials": trials}
     about |= {"seat": own, "players": words} if words else {}
+    about |= {} if rooms.is_test_set else {"rooms": rooms.name}
     progress = _Progress(episodes)
     try:
         if own not in seated:
@@ -113,6 +117,7 @@ def let_models_play(
             options.concurrency,
             progress.note,
             folder,
+            rooms,
         )
     except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
@@ -168,7 +173,7 @@ def _model(
     return LanguageModelPlayer(program, endpoint, prompting, place, loaded, briefing, seat, budget)
 
 
-def episodes_of_models(run: Path, program: Playable, most: int) -> ModelEpisodes:
+def episodes_of_models(run: Path, program: Playable, rooms: RoomSet, most: int) -> ModelEpisodes:
     """The results of the first episodes with models, from their transcripts in the folder `run`.
 
     Raises:
@@ -177,7 +182,7 @@ def episodes_of_models(run: Path, program: Playable, most: int) -> ModelEpisodes
     from socialai_dsl.llm.players import SettingsMismatchError, kept_games
 
     try:
-        kept = kept_games(program, run / TRANSCRIPTS, most)
+        kept = kept_games(program, run / TRANSCRIPTS, rooms, most)
     except SettingsMismatchError as error:
         raise UsageError(str(error)) from None
     if not kept.games:

@@ -9,6 +9,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.partners import Partners, own_seat, partners_of, seating, sitting
 from socialai_dsl.episodes.players import HUMAN_FOLDER, Player, session_folder
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.frontend import load
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs.folder import scenario_folder_name
@@ -70,6 +71,7 @@ def play_test_episodes(
     program: Playable,
     episodes: int,
     briefing: Briefing,
+    rooms: RoomSet,
 ) -> "list[FinishedEpisode]":
     """Let a person play test episodes until they quit, and keep everything in the session's folder.
 
@@ -81,6 +83,7 @@ def play_test_episodes(
         program: the same, compiled.
         episodes: how many there are.
         briefing: what they are told of the task.
+        rooms: which are played.
 
     Raises:
         UsageError: there is no terminal, or a partner cannot sit there.
@@ -94,8 +97,10 @@ def play_test_episodes(
         about["seats"] = sitting(program, partners, own_seat(partners, program))
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
-        title = f"test episode {number}" if player.view == "seat" else f"{name}, test episode {number}"
-        return (title, {"options": {"test_episode": number}}) if number < episodes else None
+        if number >= episodes:
+            return None
+        title = rooms.title(number)
+        return title if player.view == "seat" else f"{name}, {title}", rooms.reset(number)
 
     folder = session / name
     return play(scenario, episode, folder, about, briefing, player.view, False, seats=filled, loaded=loaded)

@@ -10,8 +10,9 @@ import numpy as np
 from socialai_dsl.analysis.effort import Clock, why_no_more
 from socialai_dsl.analysis.search import Finding, search_rooms
 from socialai_dsl.envs.factory import make_vec
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, SeededRooms, Step, play
+from socialai_dsl.episodes.play import AGENT, EachRoom, Observer, Rooms, Step, play
 from socialai_dsl.episodes.policies import ScriptedPolicy
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.episodes.scripts import with_script
 
 _TOGETHER: Final = 250
@@ -212,7 +213,12 @@ def _play(scripted: str, played: _Played, seed: int, clock: Clock) -> None:
         return clock.is_over
 
     try:
-        play(Rooms(envs, [played]), {AGENT: ScriptedPolicy(envs)}, SeededRooms(seed, rooms), over)
+        play(
+            Rooms(envs, [played]),
+            {AGENT: ScriptedPolicy(envs)},
+            EachRoom(rooms, rooms=RoomSet.of_seed(seed)),
+            over,
+        )
     finally:
         envs.close()
 

@@ -75,6 +75,10 @@ def _recording(
     assert person.run is not None, "internal: a person has played before"
     folder = person.run / scenario_folder_name(scenario)
     evaluation = evaluation_of_person(folder, scenario, most)
+    if not evaluation.rooms.is_test_set:
+        raise UsageError(
+            f"{person.run}: played rooms of {evaluation.rooms.name}, expected those of the test set"
+        )
     own, beside = evaluation.seat, _beside(folder, program, evaluation.seat)
     sat = (all(_sat(player, name, folder) for name in beside.values()) for player in players)
     partner = next((number for number, so in enumerate(sat) if so), None)

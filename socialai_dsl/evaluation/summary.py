@@ -17,7 +17,7 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
         ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} (Wilson)"),
-        ("episodes", f"{figures['episodes']} of the test set{manner}"),
+        ("episodes", f"{figures['episodes']} {_of_rooms(figures)}{manner}"),
         ("mean length", f"{figures['mean_length']:.1f} steps"),
         ("mean return", f"{figures['mean_return']:.3f}"),
     ]
@@ -48,7 +48,7 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     for seat, found in figures.get("models", {}).items():
         rows += [(f"{name} of {seat}", value) for name, value in _model_rows(found)]
     if figures.get("unsolved"):
-        rows.append(("unsolved", _numbers(figures["unsolved"])))
+        rows.append(("unsolved", _numbers(figures)))
     return rows
 
 
@@ -126,8 +126,15 @@ def _shortened(text: str) -> str:
     return text if len(text) <= _TEXT_WIDTH else text[: _TEXT_WIDTH - 1] + "…"
 
 
-def _numbers(episodes: list[int]) -> str:
-    """The first of a list of test episodes; `result.json` has them all."""
+def _of_rooms(figures: Mapping[str, Any]) -> str:
+    rooms = figures.get("rooms", "test")  # older results know of no others
+    return "of the test set" if rooms == "test" else f"in rooms of {rooms.replace(':', ' ')}"
+
+
+def _numbers(figures: Mapping[str, Any]) -> str:
+    """The first of the unsolved episodes; `result.json` has them all."""
+    episodes = figures["unsolved"]
     shown = ", ".join(map(str, episodes[:_NUMBERS_SHOWN]))
     more = len(episodes) - _NUMBERS_SHOWN
-    return f"test episodes {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")
+    what = "test episodes" if figures.get("rooms", "test") == "test" else "rooms"
+    return f"{what} {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.atomic import read_json
 from socialai_dsl.checking.briefing import NO_BRIEFING, Briefing
 from socialai_dsl.checking.loaded import Loaded, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.scenario_env import ScenarioEnv
-from socialai_dsl.envs.told_apart import of_test_episodes
+from socialai_dsl.envs.told_apart import of_rooms
 from socialai_dsl.episodes.film import RecordedEpisode, film
 from socialai_dsl.episodes.partners import (
     Company,
@@ -25,17 +26,19 @@ from socialai_dsl.episodes.partners import (
     replayed_seats,
     sitting,
 )
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, TestEpisodes, play
+from socialai_dsl.episodes.play import AGENT, EachRoom, Observer, Rooms, Seat, play
 from socialai_dsl.episodes.players import Player, make_policy
 from socialai_dsl.episodes.policies import Policy
 from socialai_dsl.episodes.results import Actions, EvalResult, Results, wilson_interval
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.episodes.traces import Think, thought_of, trace_of
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.evaluation.language_model import ModelEpisodes, episodes_of_models, let_models_play
 from socialai_dsl.evaluation.people import play_test_episodes
 from socialai_dsl.frontend import load
 from socialai_dsl.llm.episode import CUT_SHORT
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed, seats_of
+from socialai_dsl.runs.folder import ROOMS
 from socialai_dsl.traces import Thought, Trace
 from socialai_dsl.traces.document import Outcome
 from socialai_dsl.traces.endings import Ending, endings_of, short_name
@@ -60,6 +63,7 @@ class _Played:
     trials: int
     seat: Seat
     partners: Partners
+    rooms: RoomSet
 
     @property
     def scripts(self) -> list[Seat]:
@@ -109,10 +113,10 @@ class _Played:
                     trace_of(
                         env,
                         own,
-                        {"options": {"test_episode": number}},
+                        self.rooms.reset(number),
                         scenario=self.scenario,
                         agent=self.partners.get(env.seat_names[0], self.player).agent,
-                        episode=f"test episode {number}",
+                        episode=self.rooms.title(number),
                         endings=texts,
                         about=about_of(self.loaded),
                         think=None if policy is None else _thinking(policy, number),
@@ -159,6 +163,7 @@ class Evaluation:
         briefing: what the player was told of the task.
         seat: the one that the player had, whose success and reward the results are.
         partners: who sat on other seats; the player itself on those that are left.
+        rooms: those that were played.
     """
 
     scenario: str
@@ -177,6 +182,7 @@ class Evaluation:
     briefing: Briefing = NO_BRIEFING
     seat: Seat = AGENT
     partners: Partners = field(default_factory=dict)
+    rooms: RoomSet = TEST_ROOMS
 
     @property
     def granted(self) -> dict[str, Any]:
@@ -200,6 +206,7 @@ class Evaluation:
         shares = result.outcomes
         figures: dict[str, Any] = {
             "episodes": result.episodes,
+            "rooms": self.rooms.name,
             "success_rate": result.success_rate,
             "success_rate_se": result.success_rate_se,
             "success_interval": list(result.success_interval),
@@ -217,7 +224,8 @@ class Evaluation:
                 seat: _some_of(int(won.sum()), len(won)) for seat, (won, _) in result.others.items()
             }
         figures |= {**_by_member(self.program, shares), **self.more}
-        for (draw, value), numbers in of_test_episodes(self.loaded, self.program, result.episodes).items():
+        apart = of_rooms(self.loaded, self.program, self.rooms.reset, result.episodes)
+        for (draw, value), numbers in apart.items():
             won = int(result.success[numbers].sum())
             figures.setdefault("results_by", {}).setdefault(draw, {})[value] = _some_of(won, len(numbers))
         if self.player.is_script:
@@ -248,11 +256,10 @@ class Evaluation:
         """
         seats, own = self._episodes.replayed(number)
         env = ScenarioEnv(self.program, "rgb_array", scenarios_of(self.loaded), seats)
-        title = f"{short_name(self.scenario)}, test episode {number}, {short_name(label)}"
+        title = f"{short_name(self.scenario)}, {self.rooms.title(number)}, {short_name(label)}"
         endings = {ending.name: ending for ending in self.endings}
         try:
-            reset = {"options": {"test_episode": number}}
-            return film(env, own, reset, title, endings)
+            return film(env, own, self.rooms.reset(number), title, endings)
         finally:
             env.close()
 
@@ -281,7 +288,15 @@ class Evaluation:
     def _episodes(self) -> _Played:
         own, partners = self.seat, self.partners
         return _Played(
-            self.scenario, self.loaded, self.program, self.player, self.actions, self.trials, own, partners
+            self.scenario,
+            self.loaded,
+            self.program,
+            self.player,
+            self.actions,
+            self.trials,
+            own,
+            partners,
+            self.rooms,
         )
 
 
@@ -294,8 +309,9 @@ def play_test_set(
     trials: int = 1,
     partners: Partners = MappingProxyType({}),
     observers: Sequence[Observer] = (),
+    chosen: RoomSet = TEST_ROOMS,
 ) -> Evaluation:
-    """Play test episodes 0 to `episodes - 1` of a scenario.
+    """Play rooms 0 to `episodes - 1` of the test set, or of other rooms, of a scenario.
 
     Args:
         player: who plays, and how.
@@ -307,6 +323,7 @@ def play_test_set(
         partners: who sits on other seats than the player. On those that are left it plays as well, a person, a
             language model or a rival on the first of them alone.
         observers: watch as well, where neither a person nor a language model plays.
+        chosen: the rooms.
 
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
@@ -315,22 +332,23 @@ def play_test_set(
     endings, briefing = endings_of(loaded, program), player.briefing(loaded)
     own = own_seat(partners, program)
     if player.is_person:
-        person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing)
-        return _of_person(person, scenario, loaded, program, player, own, partners, briefing)
+        person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing, chosen)
+        found = _of_person(person, scenario, loaded, program, player, own, partners, briefing)
+        return replace(found, rooms=chosen)
     if player.is_model or player.rival is not None:  # which play on one seat alone
         partners = _with_idle(partners, own, program)
     if models := [one for one in (player, *partners.values()) if one.is_model]:
         players = {seat: partners.get(seat, player) for seat in seats_of(program)}
         place = models[0].kept_in
-        played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials)
+        played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials, chosen)
         found = _of_models(played, scenario, loaded, program, player, partners, briefing)
-        return replace(found, trials=trials)
+        return replace(found, trials=trials, rooms=chosen)
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
-        result = _result_of(playing, episodes, [kept, *observers], trials)
+        result = _result_of(playing, episodes, [kept, *observers], trials, chosen)
     told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
-    return replace(found, trials=trials, seat=own, partners=partners)
+    return replace(found, trials=trials, seat=own, partners=partners, rooms=chosen)
 
 
 def trace_test_episodes(
@@ -341,6 +359,7 @@ def trace_test_episodes(
     numbers: Sequence[int],
     trials: int = 1,
     partners: Partners = MappingProxyType({}),
+    chosen: RoomSet = TEST_ROOMS,
 ) -> tuple[list[Trace], list[str]]:
     """Trace some test episodes as `play_test_set` plays them, without playing those before.
 
@@ -355,6 +374,7 @@ def trace_test_episodes(
         numbers: of the episodes.
         trials: how many in a row the player remembers.
         partners: see `play_test_set`.
+        chosen: see `play_test_set`.
 
     Returns:
         The traces, and what is to be known about the player.
@@ -366,9 +386,9 @@ def trace_test_episodes(
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, len(sessions)) as playing:
         rooms = Rooms(playing.envs, [kept], playing.own, playing.scripts)
-        play(rooms, playing.policies, TestEpisodes(sessions[-1] + trials, trials, iter(sessions)))
+        play(rooms, playing.policies, EachRoom(sessions[-1] + trials, trials, iter(sessions), chosen))
     texts = {one.name: one.text for one in endings_of(loaded, program)}
-    played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners)
+    played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners, chosen)
     return played.traces(numbers, texts), playing.told
 
 
@@ -386,6 +406,21 @@ def _playing(
     return company(players, own, scenario, loaded, program, min(TOGETHER, sessions))
 
 
+def rooms_of(folder: Path) -> RoomSet:
+    """The rooms that were played in the folder of an evaluation.
+
+    Raises:
+        UnreadableError: the file that says so is damaged.
+    """
+    try:
+        kept = read_json(folder / ROOMS)
+        return RoomSet(kept["name"], kept["seed"], kept["layouts"])
+    except FileNotFoundError:
+        return TEST_ROOMS
+    except KeyError as error:
+        raise UnreadableError(f"{folder / ROOMS}: lacks {error}, expected which rooms were played") from None
+
+
 def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
     """The first test episodes that a language model has played, as the folder `run` of its evaluation keeps them.
 
@@ -395,9 +430,11 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
     """
     loaded = load(scenario)
     program = compile_loaded(loaded)
-    kept = episodes_of_models(run, program, most)
+    rooms = rooms_of(run)
+    kept = episodes_of_models(run, program, rooms, most)
     partners = {seat: meant_by(word) for seat, word in kept.players.items() if seat != kept.own}
-    return _of_models(kept, scenario, loaded, program, Player(agent, out=run), partners)
+    found = _of_models(kept, scenario, loaded, program, Player(agent, out=run), partners)
+    return replace(found, rooms=rooms)
 
 
 def _of_models(
@@ -453,7 +490,11 @@ def evaluate_policy(
 
 
 def _result_of(
-    playing: Company, episodes: int, observers: Sequence[Observer] = (), trials: int = 1
+    playing: Company,
+    episodes: int,
+    observers: Sequence[Observer] = (),
+    trials: int = 1,
+    chosen: RoomSet = TEST_ROOMS,
 ) -> EvalResult:
     """See `evaluate_policy`."""
     if episodes < 1:
@@ -464,7 +505,7 @@ def _result_of(
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]
     rooms = Rooms(envs, [results, *observers], playing.own, playing.scripts)
-    play(rooms, playing.policies, TestEpisodes(episodes, trials))
+    play(rooms, playing.policies, EachRoom(episodes, trials, rooms=chosen))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
 
@@ -488,15 +529,9 @@ def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
     if about.get("program_sha256") != program.sha256:
         raise UsageError(f"{run} holds episodes of another version of the scenario")
     partners = {seat: meant_by(word) for seat, word in about.get("seats", {}).items()}
-    return _of_person(
-        played[:most],
-        scenario,
-        loaded,
-        program,
-        Player("human", out=run.parent),
-        about.get("seat", AGENT),
-        partners,
-    )
+    player, own = Player("human", out=run.parent), about.get("seat", AGENT)
+    found = _of_person(played[:most], scenario, loaded, program, player, own, partners)
+    return replace(found, rooms=rooms_of(run))
 
 
 def _of_person(

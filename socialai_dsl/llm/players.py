@@ -28,9 +28,10 @@ from socialai_dsl.envs import make_vec
 from socialai_dsl.envs.asking import Question, probe_names
 from socialai_dsl.envs.seats import SCRIPT
 from socialai_dsl.episodes.partners import Company
-from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat, Step, TestEpisodes, at_once, play_async
+from socialai_dsl.episodes.play import AGENT, EachRoom, Observer, Rooms, Seat, Step, at_once, play_async
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
 from socialai_dsl.episodes.results import Actions
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.llm.actions import Action, ToolCall
 from socialai_dsl.llm.endpoint import Answer, ContextFull, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import (
@@ -175,12 +176,13 @@ class Kept:
     players: Mapping[Seat, str]
 
 
-def kept_games(program: Playable, folder: Path, most: int) -> Kept:
+def kept_games(program: Playable, folder: Path, chosen: RoomSet, most: int) -> Kept:
     """The first episodes that are over, from their transcripts; nobody is asked.
 
     Args:
         program: of the scenario that was played.
         folder: of the transcripts.
+        chosen: the rooms that were played.
         most: how many episodes, at most.
 
     Raises:
@@ -194,7 +196,9 @@ def kept_games(program: Playable, folder: Path, most: int) -> Kept:
         raise SettingsMismatchError(f"{folder} holds episodes of another version of the scenario")
     own, players = settings.get("seat", AGENT), settings.get("players", {})
     places = {seat: folder if seat == own else folder / seat for seat in players or (AGENT,)}
-    models = {seat: _kept_model(program, seat, place) for seat, place in places.items() if _has_model(place)}
+    models = {
+        seat: _kept_model(program, seat, place, chosen) for seat, place in places.items() if _has_model(place)
+    }
     envs = make_vec(
         program, copy=False, autoreset_mode="Disabled", seats="all" if len(players) > 1 else AGENT
     )
@@ -208,7 +212,7 @@ def kept_games(program: Playable, folder: Path, most: int) -> Kept:
         if seat in rooms.seats
     }
     try:
-        at_once(play_async(rooms, policies, TestEpisodes(most, settings["trials"])))
+        at_once(play_async(rooms, policies, EachRoom(most, settings["trials"], rooms=chosen)))
         return Kept(games.played()[:most], own, players)
     finally:
         envs.close()
@@ -228,7 +232,7 @@ def _has_model(folder: Path) -> bool:
     return (folder / _SETTINGS).is_file() and "model" in _settings_of(folder)
 
 
-def _kept_model(program: Playable, seat: Seat, folder: Path) -> ModelPolicy:
+def _kept_model(program: Playable, seat: Seat, folder: Path, chosen: RoomSet) -> ModelPolicy:
     """A model that says what it said before. Raises SettingsMismatchError where it is not known how it played."""
     settings = _settings_of(folder)
     try:
@@ -236,7 +240,7 @@ def _kept_model(program: Playable, seat: Seat, folder: Path) -> ModelPolicy:
     except (KeyError, TypeError):
         raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
     text = TextSeat(program, **prompting.of_episodes, seat=seat)
-    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody, compares=False)
+    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody, compares=False, chosen=chosen)
 
 
 async def _nobody(conversation: Conversation) -> Answer:
@@ -283,6 +287,7 @@ class LanguageModelPlayer:
         self,
         client: httpx.AsyncClient,
         failures: Sequence[Exception],
+        chosen: RoomSet = TEST_ROOMS,
         progress: Callable[[PlayedEpisode], None] | None = None,
     ) -> ModelPolicy:
         """The model in one room.
@@ -290,6 +295,7 @@ class LanguageModelPlayer:
         Args:
             client: for its requests.
             failures: when there is one, in this room or another, no further request is made.
+            chosen: the rooms that are played.
             progress: see `ModelPolicy`.
         """
 
@@ -310,7 +316,7 @@ class LanguageModelPlayer:
             seat=self.seat,
             loaded=self._loaded,
         )
-        return ModelPolicy(text, self._prompting, self._place, ask, progress)
+        return ModelPolicy(text, self._prompting, self._place, ask, progress, chosen=chosen)
 
     async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
         """The model's answer; also that the conversation has outgrown its context, which ends the episode."""
@@ -335,6 +341,7 @@ def play_games(
     concurrency: int = 1,
     progress: Callable[[PlayedEpisode], None] | None = None,
     keep: Path | None = None,
+    chosen: RoomSet = TEST_ROOMS,
 ) -> list[PlayedGame]:
     """Play test episodes 0 to `episodes - 1`; what models have answered already is read from their transcripts.
 
@@ -346,13 +353,14 @@ def play_games(
         concurrency: how many are played at once.
         progress: is told of each episode that is over, as the first of the models played it.
         keep: a folder that gets the actions of all seats, where there are several.
+        chosen: the rooms; by default the test set.
 
     Raises:
         EndpointError: an endpoint does not answer. What was played is kept.
         SettingsMismatchError: a transcript is of an episode that goes another way now.
         OSError: a transcript cannot be read or written.
     """
-    return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep))
+    return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep, chosen))
 
 
 async def _play(
@@ -363,6 +371,7 @@ async def _play(
     concurrency: int,
     progress: Callable[[PlayedEpisode], None] | None,
     keep: Path | None,
+    chosen: RoomSet,
 ) -> list[PlayedGame]:
     sessions = iter(range(0, episodes, trials))
     tables: list[Games] = []
@@ -370,7 +379,7 @@ async def _play(
 
     async def work(clients: Sequence[httpx.AsyncClient]) -> None:
         policies = {
-            model.seat: model.policy(client, failures, None if number else progress)
+            model.seat: model.policy(client, failures, chosen, None if number else progress)
             for number, (model, client) in enumerate(zip(models, clients, strict=True))
         }
         with company() as beside:
@@ -379,7 +388,7 @@ async def _play(
             rooms = Rooms(beside.envs, [*policies.values(), games], beside.own, beside.scripts)
             playing = {seat: policies.get(seat) or beside.policies[seat] for seat in rooms.seats}
             try:
-                await play_async(rooms, playing, TestEpisodes(episodes, trials, sessions))
+                await play_async(rooms, playing, EachRoom(episodes, trials, sessions, chosen))
             except (EndpointError, OSError, SettingsMismatchError) as error:
                 failures.append(error)
 
@@ -497,6 +506,7 @@ class ModelPolicy(Observer):
             leave all that are left.
         progress: is told of each episode that is over.
         compares: whether what a transcript holds must be about what is seen now.
+        chosen: the rooms that are played.
 
     Attributes:
         played: these episodes.
@@ -511,8 +521,9 @@ class ModelPolicy(Observer):
         ask: Callable[[Conversation], Awaitable[Answer]],
         progress: Callable[[PlayedEpisode], None] | None = None,
         compares: bool = True,
+        chosen: RoomSet = TEST_ROOMS,
     ) -> None:
-        self._compares = compares
+        self._compares, self._chosen = compares, chosen
         self._seat, self._prompting, self._place, self._ask = seat, prompting, place, ask
         self._progress = progress
         self._rooms: Rooms
@@ -529,7 +540,7 @@ class ModelPolicy(Observer):
         number = int(rooms.numbers[0])
         before = self._conversation if number % self._prompting.trials else None
         path = self._place(number)
-        text = self._seat.begin(rooms, options={"test_episode": number})
+        text = self._seat.begin(rooms, **self._chosen.reset(number))
         self._rooms = rooms
         self._conversation = Conversation(self._seat, self._prompting, number, path, text, before)
 

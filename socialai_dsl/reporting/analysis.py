@@ -294,10 +294,11 @@ def _comparison(first: Summary, second: Summary) -> dict[str, Any]:
 def pair_by_room(first: Summary, second: Summary) -> dict[str, Any] | None:
     """Compare two conditions in the test episodes that both list, on the same seat; None without such.
 
-    The same number is the same room only in the same program.
+    The same number is the same room only in the same program and the same set of rooms.
     """
     runs: list[RunRecord] = [*first.condition.done, *second.condition.done]
-    played = {(run.result.program_sha256, run.result.seat) for run in runs if run.result is not None}
+    results = [run.result for run in runs if run.result is not None]
+    played = {(result.program_sha256, result.seat, result.eval.rooms) for result in results}
     rooms = pd.concat([first.condition.rooms, second.condition.rooms], axis=1, join="inner")
     if len(played) != 1 or rooms.empty:
         return None

@@ -324,6 +324,8 @@ def _granted(result: ResultRecord | None) -> Iterator[str]:
             yield f'told "{result.told}"' if isinstance(result.told, str) and result.told else "told a goal"
         elif result.tell != "nothing":
             yield f"told {result.tell}" + (f" ({result.language})" if result.language else "")
+        if result.eval.rooms != "test":
+            yield f"rooms of {result.eval.rooms}"
         if result.view != "seat":
             yield f"sees the {result.view}"
         if result.greedy or (result.kind == "model" and result.eval.actions != ModelOptions().manner):

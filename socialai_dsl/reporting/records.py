@@ -42,6 +42,7 @@ class Figures(Record):
     """What came of the test episodes: the object `eval` of a result.
 
     Attributes:
+        rooms: `test` of the test set, or which others, such as `seed:7`.
         actions: how they came about, in a phrase.
         trials: in order, where players remembered several episodes in a row.
         results_by: draw -> value -> what came of the episodes with it.
@@ -51,6 +52,7 @@ class Figures(Record):
     """
 
     episodes: int = Field(ge=1)
+    rooms: str = "test"
     success_rate: float = Field(ge=0, le=1)
     mean_length: float
     mean_return: float

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
 from socialai_dsl.atomic import read_json, write_json
-from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.envs.options import refuse_unknown
 from socialai_dsl.episodes.partners import called, partners_of
@@ -27,8 +27,10 @@ from socialai_dsl.episodes.players import (
     require_trainer,
     session_folder,
 )
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.errors import OptionError, UsageError
-from socialai_dsl.evaluation.test_set import Evaluation, play_test_set
+from socialai_dsl.evaluation.language_model import TRANSCRIPTS
+from socialai_dsl.evaluation.test_set import Evaluation, play_test_set, rooms_of
 from socialai_dsl.frontend import load
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.copies import keep_partners, keep_scenario
@@ -37,6 +39,7 @@ from socialai_dsl.runs.folder import (
     EVALUATIONS,
     LOCK_FILES,
     RESULT,
+    ROOMS,
     Run,
     new_folders,
     only_writer,
@@ -46,6 +49,7 @@ from socialai_dsl.runs.folder import (
 from socialai_dsl.runs.options import resolved_device
 from socialai_dsl.runs.recordings import write_recordings
 from socialai_dsl.runs.versions import versions
+from socialai_dsl.schema.scenario import TEST_SET
 from socialai_dsl.traces.endings import short_name
 from socialai_dsl.trainer.config import MODEL_PREFIX, RunConfig
 
@@ -67,15 +71,16 @@ RECORDED: Final = 3
 def evaluate(
     agent: Agent,
     scenario: str | Path | None = None,
-    episodes: int = 500,
+    episodes: int | None = None,
     *,
+    rooms: str | Path | RoomSet = TEST_ROOMS,
     out: str | Path | None = None,
     record: int = RECORDED,
     trials: int = 1,
     seats: Mapping[str, str | Player] = MappingProxyType({}),
     **options: Any,
 ) -> Evaluation:
-    """Play test episodes 0 to `episodes - 1` of a scenario, as `socialai evaluate` does.
+    """Play rooms 0 to `episodes - 1` of the test set of a scenario, or of other rooms, as `socialai evaluate` does.
 
     Args:
         agent: `random`, `oracle` (the scenario's own script), `rival:NAME` (one of its rivals), `human`, `llm:MODEL`,
@@ -83,7 +88,9 @@ def evaluate(
             `Player`; or a policy of your own, see `Policy`, a model of Stable-Baselines3, or a function from
             observations to actions.
         scenario: a path or a name, with `+variants` and `?parameters`; None: that of the run.
-        episodes: how many. Rooms are the same for every agent, on every machine.
+        episodes: how many; by default 500, or all of a file. Rooms are the same for every agent, on every machine.
+        rooms: `test` for the test set; `seed:N` for those of a seed, as `check` and `trace` number them; or a
+            JSON or YAML file with a list of layouts, a room each.
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
             episodes and a list of all; reports take it. A language model and a person have one in any case.
         record: up to how many successes, and how many failures, are filmed there.
@@ -107,7 +114,8 @@ def evaluate(
     named = [] if scenario is None else [str(scenario)]
     place = None if out is None else Path(out)
     player, partners = made_players(agent, list(seats.items()), named, options, place)
-    asked = episodes, record, place, trials, partners
+    chosen = rooms if isinstance(rooms, RoomSet) else RoomSet.named(rooms)
+    asked = episodes, record, place, trials, partners, chosen
     with contextlib.closing(evaluate_each(player, named, *asked)) as evaluations:
         return next(evaluations)
 
@@ -115,15 +123,17 @@ def evaluate(
 def evaluate_each(
     player: Player,
     scenarios: Sequence[str],
-    episodes: int,
+    episodes: int | None,
     record: int = RECORDED,
     out: Path | None = None,
     trials: int = 1,
     seats: Sequence[tuple[str, str | Player]] = (),
+    rooms: RoomSet = TEST_ROOMS,
 ) -> Generator[Evaluation, None, None]:
     """`evaluate` on several scenarios, one after the other; none: that of the run. `out` gets a list of all results."""
-    if not isinstance(episodes, int) or not 1 <= episodes <= MOST_EPISODES:
-        raise OptionError("episodes", f"got {episodes!r}, expected a whole number from 1 to {MOST_EPISODES}")
+    episodes = min(TEST_SET, rooms.count) if episodes is None else episodes
+    if not isinstance(episodes, int) or not 1 <= episodes <= rooms.count:
+        raise OptionError("episodes", f"got {episodes!r}, expected a whole number from 1 to {rooms.count}")
     if not isinstance(trials, int) or trials < 1 or episodes % trials:
         raise OptionError("trials", f"got {trials!r}, expected a divisor of the {episodes} episodes")
     if player.is_person and trials > 1:
@@ -134,7 +144,7 @@ def evaluate_each(
     results = []
     with contextlib.nullcontext() if folder is None else _writing(folder):
         for scenario in scenarios or [own_scenario(str(player.run or player.agent))]:
-            evaluation = _evaluated(player, scenario, episodes, trials, record, folder, seats)
+            evaluation = _evaluated(player, scenario, episodes, trials, record, folder, seats, rooms)
             results.append(result_of(evaluation))
             if folder is not None:
                 # After each scenario, so that nothing is lost should the agent not fit the next one.
@@ -158,15 +168,24 @@ def _evaluated(
     record: int,
     out: Path | None,
     seats: Sequence[tuple[str, str | Player]],
+    rooms: RoomSet,
 ) -> Evaluation:
     playing = replace(player, agent=named_agent(player.agent, scenario)) if player.policy is None else player
     loaded = load(scenario)
     program = compiled(loaded)
     partners = partners_of(seats, scenario, program)
-    asked = program, episodes, trials, partners
+    rooms.check(program)
+    play = partial(
+        play_test_set, playing, scenario, loaded, program, episodes, trials, partners, chosen=rooms
+    )
     if out is None:
-        return play_test_set(playing, scenario, loaded, *asked)
+        return play()
     place = out / scenario_folder_name(scenario)
+    before = rooms_of(place)
+    if before.name != rooms.name and (place / TRANSCRIPTS).is_dir():
+        raise OptionError(
+            "rooms", f"got {rooms.name}, but {place} holds episodes of {before.name}; choose another folder"
+        )
     with new_folders(place) as made:
         kept = keep_scenario(place, scenario, loaded).scenario
         # As a run that trained nothing, so that reports take it as one.
@@ -177,8 +196,12 @@ def _evaluated(
             own = {seat: [one.agent] for seat, one in partners.items() if one.policy is not None}
             settings |= {"seats": keep_partners(place, networks) | own}
         write_json(place / CONFIG, settings)
+        if rooms.is_test_set:
+            (place / ROOMS).unlink(missing_ok=True)
+        else:
+            write_json(place / ROOMS, rooms.record())
         made.update(place.iterdir())
-        played = play_test_set(playing, scenario, loaded, *asked)
+        played = play()
     evaluation = replace(played, folder=place, kept=kept)
     write_recordings(evaluation, out, record, f"agent {short_name(player.agent)}")
     write_json(place / RESULT, result_of(evaluation))

@@ -11,10 +11,10 @@ from typing import Any, Final
 from pydantic import TypeAdapter, ValidationError
 
 from socialai_dsl.atomic import write_text
-from socialai_dsl.baselines import MOST_EPISODES
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.partners import Named, partners_of
 from socialai_dsl.episodes.players import Agent, Player, folder_of, named_agent
+from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.episodes.scripts import script_of
 from socialai_dsl.errors import OptionError, UsageError, first_mistake
 from socialai_dsl.evaluation.language_model import TRANSCRIPTS
@@ -23,6 +23,7 @@ from socialai_dsl.evaluation.test_set import (
     evaluation_of_model,
     evaluation_of_person,
     play_test_set,
+    rooms_of,
     trace_test_episodes,
 )
 from socialai_dsl.frontend import load
@@ -113,7 +114,7 @@ def _played(
 ) -> list[Trace]:
     """Those episodes that were asked for, or successes and failures, of a run or a scenario."""
     evaluation: Evaluation | None = None
-    trials, named = 1, list[tuple[str, str]]()
+    trials, named, rooms = 1, list[tuple[str, str]](), TEST_ROOMS
     if (folder_of(source) / CONFIG).is_file():
         if agent is not None:
             raise OptionError(
@@ -122,7 +123,7 @@ def _played(
         folder, scenario = folder_of(source), own_scenario(source)
         evaluation = _kept(folder, scenario, episodes if numbers is None else max(numbers) + 1, greedy)
         player = made_player(source, [], _greedy(greedy), None) if evaluation is None else evaluation.player
-        run = Run(folder)
+        run, rooms = Run(folder), rooms_of(folder)
         trials = (run.result or {}).get("trials", 1)
         named = [(seat, names[0]) for seat, names in run.config.partners.items()]
     else:
@@ -130,11 +131,12 @@ def _played(
     if evaluation is None:
         # What a policy of one's own does may depend on all that it played before.
         if numbers is not None and player.policy is None:
-            return _alone(player, scenario, numbers, trials, named)
+            return _alone(player, scenario, numbers, trials, named, rooms)
         loaded, count = load(scenario), episodes if numbers is None else max(numbers) + 1
-        program, whole = compiled(loaded), -(-count // trials) * trials
+        most = rooms.count // trials * trials
+        program, whole = compiled(loaded), min(-(-count // trials) * trials, most)
         partners = partners_of(named, scenario, program)
-        evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners)
+        evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners, chosen=rooms)
     _warn(evaluation.warnings)
     if numbers is None:
         return evaluation.traces(evaluation.to_replay(record))
@@ -147,15 +149,17 @@ def _played(
     return evaluation.traces(numbers)
 
 
-def _alone(player: Player, scenario: str, numbers: Sequence[int], trials: int, named: Named) -> list[Trace]:
-    """These test episodes, without playing others than those of their sessions."""
+def _alone(
+    player: Player, scenario: str, numbers: Sequence[int], trials: int, named: Named, rooms: RoomSet
+) -> list[Trace]:
+    """These episodes, without playing others than those of their sessions."""
     for number in numbers:
-        if not 0 <= number < MOST_EPISODES:
-            raise OptionError("test_episode", f"got {number}, expected 0 to {MOST_EPISODES - 1}")
+        if not 0 <= number < rooms.count:
+            raise OptionError("test_episode", f"got {number}, expected 0 to {rooms.count - 1}")
     loaded = load(scenario)
     program = compiled(loaded)
     partners = partners_of(named, scenario, program)
-    traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials, partners)
+    traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials, partners, rooms)
     _warn(told, callers=5)
     return traces
 

@@ -15,7 +15,7 @@ from socialai_dsl.analysis.coverage import coverage
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.tally import Tally, Watch, parts_of
 from socialai_dsl.compilation import scenarios_of
-from socialai_dsl.episodes import AGENT, FunctionPolicy, Rooms, ScriptedPolicy, SeededRooms, play
+from socialai_dsl.episodes import AGENT, EachRoom, FunctionPolicy, Rooms, RoomSet, ScriptedPolicy, play
 from socialai_dsl.evaluation.coverage_report import Counting
 from tests.tiny import Folder
 
@@ -46,7 +46,7 @@ class Chosen:
 
 def counted(envs: Any, name: str, policy: Any, episodes: int, seed: int) -> Tally:
     counting = Counting(Watch(envs, scenarios_of(sd.load(name))))
-    play(Rooms(envs, [counting]), {AGENT: policy}, SeededRooms(seed, episodes))
+    play(Rooms(envs, [counting]), {AGENT: policy}, EachRoom(episodes, rooms=RoomSet.of_seed(seed)))
     return counting.watch.tally(counting.ended)
 
 

