@@ -5,6 +5,9 @@ from contextlib import closing
 from typing import Any, Literal
 
 import verifiers.v1 as vf
+from openai import APIStatusError, AsyncOpenAI
+from verifiers.v1.dialects.chat import message_to_wire
+from verifiers.v1.harnesses.utils.compaction import is_context_overflow
 
 from socialai_dsl.llm import Episode
 
@@ -52,6 +55,37 @@ class SocialaiTaskset(vf.Taskset[RoomTask, SocialaiConfig]):
             yield RoomTask(data, asked.task)
 
 
+class SocialaiHarness(vf.Harness[vf.HarnessConfig]):
+    """The model alone, asked from this process: `null` of verifiers starts a program for each turn."""
+
+    APPENDS_SYSTEM_PROMPT = True
+    SUPPORTS_RESUME = True
+    EXECUTES_CODE = False
+    NEEDS_CONTAINER = False
+
+    async def launch(
+        self,
+        ctx: vf.ModelContext,
+        trace: vf.Trace,
+        runtime: vf.Runtime,
+        endpoint: str,
+        secret: str,
+        mcp_urls: dict[str, str],
+        data: vf.TaskData,
+    ) -> vf.ProgramResult:
+        """Ask for one reply; a conversation that has outgrown the model's context ends without one."""
+        system, prompt = self.resolve_prompt(data)
+        told = [] if system is None else [{"role": "system", "content": system}]
+        said = [vf.UserMessage(content=prompt)] if isinstance(prompt, str) else prompt or []
+        messages: Any = [*told, *map(message_to_wire, said)]
+        async with AsyncOpenAI(base_url=endpoint, api_key=secret) as client:
+            try:
+                await client.chat.completions.create(model=ctx.model, messages=messages)
+            except APIStatusError as error:
+                return vf.ProgramResult(0 if is_context_overflow(error) else 1, "", str(error))
+        return vf.ProgramResult(0, "", "")
+
+
 class SocialaiEnvConfig(vf.EnvConfig):
     """Who plays."""
 
@@ -80,4 +114,4 @@ class SocialaiEnv(vf.Env[SocialaiEnvConfig]):
         trace.record_metrics({name: float(value) for name, value in figures.items()})
 
 
-__all__ = ["SocialaiConfig", "SocialaiEnv", "SocialaiEnvConfig", "SocialaiTaskset"]
+__all__ = ["SocialaiConfig", "SocialaiEnv", "SocialaiEnvConfig", "SocialaiHarness", "SocialaiTaskset"]

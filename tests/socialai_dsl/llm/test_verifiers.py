@@ -1,4 +1,4 @@
-"""verifiers' `openenv` taskset lets a model play what `socialai serve` serves."""
+"""A model plays in verifiers: what `socialai serve` serves, and through the environment package."""
 
 import json
 import os
@@ -13,7 +13,7 @@ import pytest
 
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
-from tests.socialai_dsl.llm.endpoint import endpoint, stream
+from tests.socialai_dsl.llm.endpoint import Respond, endpoint, stream
 
 pytest.importorskip("openenv", reason="serving OpenEnv needs the extra openenv")
 VERIFIERS = os.environ.get("VERIFIERS", "")
@@ -21,24 +21,7 @@ if not VERIFIERS:
     pytest.skip("verifiers comes with `make test-models`, in a place of its own", allow_module_level=True)
 
 pytestmark = pytest.mark.timeout(900)
-ENVIRONMENT = Path(__file__).parents[3] / "environments" / "socialai"
-
-TASKS = """\
-[env.taskset]
-id = "openenv"
-base_url = "{url}"
-resets = [{{test_episode = 0}}, {{test_episode = 2}}]
-
-[env.player.harness]
-id = "null"
-
-[env.player.runtime]
-type = "subprocess"
-
-[client]
-base_url = "{model}"
-api_key_var = "MODEL_KEY"
-"""
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -71,52 +54,59 @@ def respond(request: dict[str, Any]) -> Any:
     return stream(reply) if request.get("stream") else reply
 
 
-def test_a_script_behind_a_model_gets_its_reward(url: str, tmp_path: Path) -> None:
-    with endpoint(respond) as stub:
-        (tmp_path / "tasks.toml").write_text(TASKS.format(url=url, model=stub.url), encoding="utf-8")
+def played(tasks: str, folder: Path, model: Respond = respond) -> list[dict[str, Any]]:
+    """What is left of tasks that a model plays, one that knows the script, where the file names its own."""
+    with endpoint(model) as stub:
+        tasks = tasks.replace("http://localhost:8080/v1", stub.url)
+        (folder / "tasks.toml").write_text(tasks, encoding="utf-8")
         command = "vf-eval @ tasks.toml --model stub --push False --run.name played"
         subprocess.run(
-            command.split(),
-            cwd=tmp_path,
+            f"{VERIFIERS}/{command}".split(),
+            cwd=folder,
             check=True,
-            env={**os.environ, "MODEL_KEY": "none", "PATH": f"{VERIFIERS}:{os.environ['PATH']}"},
+            env={**os.environ, "OPENAI_API_KEY": "none"},
             timeout=600,
         )
-    expected = rewards_of_the_script(0, 2)
-    lines = (tmp_path / "outputs" / "played" / "traces.jsonl").read_text(encoding="utf-8").splitlines()
+    lines = (folder / "outputs" / "played" / "traces.jsonl").read_text(encoding="utf-8").splitlines()
     traces = [trace for line in lines for trace in json.loads(line)["traces"]]
     assert [trace["errors"] for trace in traces] == [[], []]
+    return traces
+
+
+def test_the_tasks_of_the_page_give_the_script_its_reward(url: str, tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "training_language_models.md").read_text(encoding="utf-8")
+    tasks = page.split("```toml\n# tasks.toml\n")[1].split("```")[0]
+    for written, meant in (
+        ("http://127.0.0.1:8000", url),
+        ("[{seed = 1}, {seed = 2}]", "[{test_episode = 0}, {test_episode = 2}]"),
+    ):
+        assert written in tasks
+        tasks = tasks.replace(written, meant)
     rewards = {
         trace["task"]["data"]["reset"]["test_episode"]: trace["rewards"]["openenv_reward"]["score"]
-        for trace in traces
+        for trace in played(tasks, tmp_path)
     }
-    assert rewards == pytest.approx(expected)
+    assert rewards == pytest.approx(rewards_of_the_script(0, 2))
     assert min(rewards.values()) > 0
 
 
 def test_the_environment_package_plays_without_a_server(tmp_path: Path) -> None:
     """Its own smoke test: what it installs, with a stub in place of the model."""
-    with endpoint(respond) as stub:
-        smoke = (ENVIRONMENT / "smoke.toml").read_text(encoding="utf-8")
-        smoke = smoke.replace("http://localhost:8080/v1", stub.url).replace("OPENAI_API_KEY", "MODEL_KEY")
-        (tmp_path / "smoke.toml").write_text(smoke, encoding="utf-8")
-        command = "vf-eval @ smoke.toml --model stub --push False --run.name played"
-        subprocess.run(
-            command.split(),
-            cwd=tmp_path,
-            check=True,
-            env={**os.environ, "MODEL_KEY": "none", "PATH": f"{VERIFIERS}:{os.environ['PATH']}"},
-            timeout=600,
-        )
-    lines = (tmp_path / "outputs" / "played" / "traces.jsonl").read_text(encoding="utf-8").splitlines()
-    traces = [trace for line in lines for trace in json.loads(line)["traces"]]
-    assert [trace["errors"] for trace in traces] == [[], []]
+    traces = played((ROOT / "environments" / "socialai" / "smoke.toml").read_text(encoding="utf-8"), tmp_path)
     found = {
         trace["task"]["data"]["room"]["test_episode"]: trace["rewards"]["scenario_reward"]["score"]
         for trace in traces
     }
     assert found == pytest.approx(rewards_of_the_script(0, 1))
     assert [trace["metrics"]["success"] for trace in traces] == [1.0, 1.0]
+
+
+def test_a_conversation_that_outgrows_the_context_ends_without_success(tmp_path: Path) -> None:
+    """And without an error, so that what was played before counts."""
+    full = (400, {}, b'{"error": {"message": "maximum context length", "code": "context_length_exceeded"}}')
+    smoke = (ROOT / "environments" / "socialai" / "smoke.toml").read_text(encoding="utf-8")
+    traces = played(smoke, tmp_path, lambda request: full if len(request["messages"]) > 4 else "Act: left")
+    assert [(trace["metrics"]["success"], trace["metrics"]["steps"]) for trace in traces] == [(0.0, 2.0)] * 2
 
 
 def rewards_of_the_script(*numbers: int) -> dict[int, float]:
