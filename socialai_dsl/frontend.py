@@ -467,7 +467,7 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(name)
-    return result.experiment or _refuse(result, "expected an experiment")
+    return result.experiment or _refuse(result, "expected an experiment", _AN_EXPERIMENT)
 
 
 def load_curriculum(path: str | Path) -> Curriculum:
@@ -487,15 +487,23 @@ def load_study(path: str | Path) -> LoadedStudy:
         ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
     """
     result = check(path)
-    return result.study or _refuse(result, "expected a study")
+    return result.study or _refuse(result, "expected a study", _A_STUDY)
 
 
-def _refuse(result: CheckResult, expected: str) -> NoReturn:
+_AN_EXPERIMENT: Final = (
+    "it is a file of its own: `experiment: NAME`, `conditions: [{scenario: SCENARIO, frames: N}]`"
+)
+_A_STUDY: Final = (
+    "it is a file of its own: `study: NAME`, `consent: TEXT`, `blocks: [{scenario: SCENARIO, episodes: N}]`"
+)
+
+
+def _refuse(result: CheckResult, expected: str, hint: str | None = None) -> NoReturn:
     """Raise what is wrong with a file, or that it is of another kind than expected."""
     resolved = result.read()
     message = f"this is {_kind_of(result)}; {expected}"
     span = resolved.tree.key_span((resolved.kind,))
-    raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
+    raise ScenarioError([Diagnostic("S108", message, span, hint=hint)], result.sources)
 
 
 def _kind_of(result: CheckResult) -> str:

@@ -27,7 +27,10 @@ SUMMARY: Final = "test by playing what scenarios claim, and whether everything i
 
 EXAMPLES: Final = (
     ("socialai check gate.yaml", "what it claims"),
-    ("socialai check help --rooms 20 --deep", "what each needs of the other, too"),
+    (
+        "socialai check help --rooms 20 --deep",
+        "also how long success takes, and how often it is possible without the others",
+    ),
 )
 
 _OF_PART: Final = {

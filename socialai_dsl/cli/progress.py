@@ -7,6 +7,7 @@ from typing import IO, Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
+from socialai_dsl.diagnostics import counted
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs import train
 
@@ -86,7 +87,8 @@ class RunProgress:
 def _size(program: Playable) -> str:
     """The size of the agent's choices, in one phrase."""
     said = sum(1 for _ in program.sentences.each())
-    return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"
+    sizes = {"action": len(program.actions), "utterance": said, "word": len(program.vocabulary)}
+    return ", ".join(counted(number, noun) for noun, number in sizes.items())
 
 
 def _clock(seconds: float) -> str:

@@ -94,7 +94,7 @@ def _kept_in(folder: Path, function: Callable[..., int]) -> Any:
 
 def _announce(function: Callable[..., int], how_often: str) -> None:
     if function.__name__ == "serve":  # the others take a moment only
-        print(f"socialai: compiling the engine, {how_often}: 20 to 60 seconds", file=sys.stderr, flush=True)
+        print(f"socialai: compiling the engine, {how_often}: 20 to 70 seconds", file=sys.stderr, flush=True)
 
 
 @intrinsic

@@ -122,7 +122,7 @@ def _sentence(given: Any, sentences: Sentences, live: Live) -> tuple[int, ...]:
     if isinstance(given, str):
         if given in texts:
             return texts[given]
-        hint = suggested(given, texts, quoted=repr)
+        hint = suggested(given, texts, quoted=repr) or f"; expected a text such as {next(iter(texts))!r}"
         raise ValueError(f"got the sentence {given!r}, which the grammar cannot say{hint}")
     raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(texts))!r}")
 

@@ -451,6 +451,7 @@ def _known(library: Library, build: Build) -> list[str]:
     names = set(rivals_of(build.tree))
     for folder in _folders(library, build):
         stems = [name.removesuffix(".yaml") for name in yaml_files(folder) if name.endswith(".yaml")]
+        stems = [stem for stem in stems if not f"{stem}.yaml".endswith(TESTS)]
         names.update(stem for stem in stems if _is_of_any(folder / f"{stem}.yaml"))
         for ancestor in build.lineage:
             prefix = ancestor.stem + "_"

@@ -124,6 +124,8 @@ def synonym_of(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> c
         if len(args) == 1:
             return resolver.instead(f"{quoted(args[0])}.inside == {holder}", node, scope)
         return f"what lies in it says so: `x.inside == {holder}`"
+    if signature.takes == ("group",) and len(args) > 1:
+        return resolver.instead(f"{synonym}({' | '.join(map(quoted, args))})", node, scope)
     if len(signature.takes) != len(args):
         return f"write `{usage(signature)}`"
     written = f"{synonym}({', '.join(map(quoted, args))})" if args else synonym

@@ -138,6 +138,10 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
 
 def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> ReportedError:
     advice = advice_on(name, PLACES, "places are " + ", ".join(PLACES))
+    if name in ("center", "centre", "middle"):
+        advice = {
+            "hint": "the middle is `rect(W // 2, H // 2, W // 2, H // 2)`; a cell of your choice is `at: [x, y]`"
+        }
     return resolver.fail("S205", f"unknown place `{name}`", node, scope, **advice)
 
 

@@ -26,15 +26,19 @@ _CHECK_SECONDS: Final = 20.0
 
 
 def judge_claims(path: str, text: str) -> Reply:
-    """What `socialai check` finds of a text."""
+    """What `socialai check` finds of a text, or the mistakes in it, in its script or its rivals."""
+    own = display_name(Path(path))
+    try:
+        return _claims(path, texts_of(path, text), own)
+    except ScenarioError as error:
+        return {"claims": [], "findings": [finding(one, own) for one in error.diagnostics], "lines": []}
+
+
+def _claims(path: str, texts: Mapping[Path, Source], own: str) -> Reply:
     from socialai_dsl.analysis.check import check_scenario, compile_engine, scenarios_of
     from socialai_dsl.analysis.effort import Clock, Effort
 
-    own, texts = display_name(Path(path)), texts_of(path, text)
-    try:
-        loaded, cases = load(path, texts), scenarios_of(path, texts)
-    except ScenarioError as error:
-        return {"claims": [], "findings": [finding(one, own) for one in error.diagnostics], "lines": []}
+    loaded, cases = load(path, texts), scenarios_of(path, texts)
     compile_engine()  # before the time begins
     clock, is_suite = Clock(_CHECK_SECONDS, lambda said: None), isinstance(loaded, LoadedSuite)
     reply: Reply = {"claims": [], "findings": [], "lines": []}

@@ -80,7 +80,7 @@ class Desk:
         except (RefusalError, FileError) as refusal:
             why, lost = str(refusal), False
         except ScenarioError as error:
-            why, lost = error.diagnostics[0].text, False
+            why, lost = str(error.diagnostics[0]), False
         except MemoryError:
             why, lost = f"this needs more than {MOST_BYTES >> 30} GiB of memory", True
         except Exception as error:

@@ -26,7 +26,7 @@ pytest.importorskip("starlette", reason="no test of the studio without the extra
 from tests.socialai_dsl.studio.shy import SHY
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Page, WebSocketRoute
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KEYS = {
@@ -740,6 +740,29 @@ def test_a_window_closed_in_the_middle_of_a_save_loses_nothing(
 NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas[role], svg[role], [tabindex]")]
   .filter((one) => !one.ariaLabel && !one.labels?.length && !one.textContent.trim() && !one.title)
   .map((one) => one.outerHTML)"""
+
+
+def test_who_waits_for_the_first_room_is_told_what_for(page: Page, server: Server, folder: Path) -> None:
+    """On a new machine the engine is compiled first; until then nothing was found to be right either."""
+    kept: list[str] = []
+    held = True
+
+    def connect(ours: WebSocketRoute) -> None:
+        theirs = ours.connect_to_server()
+        theirs.on_message(lambda said: kept.append(said) if held and '"draw"' in said else ours.send(said))
+        routes.append(ours)
+
+    routes: list[WebSocketRoute] = []
+    page.route_web_socket(re.compile("/session"), connect)
+    page.goto(server.address)
+    page.get_by_text("while the engine is compiled").wait_for()
+    assert not page.get_by_text("Nothing is wrong.").is_visible()
+    until(page, lambda: bool(kept))
+    held = False
+    routes[0].send(kept[0])
+    drawn(page)
+    assert page.get_by_text("Nothing is wrong.").is_visible()
+    assert not page.get_by_text("while the engine is compiled").is_visible()
 
 
 def test_everything_has_a_name_for_screen_readers(studio: Page) -> None:

@@ -86,7 +86,7 @@ QUANTIFIERS: Final = (
     Value("first", "none", ("group",), "one of them", "first(d in group where ...): the first that does",
           meaning=_whole_group),
     Value("pick", "none", ("group",), "one of them", "pick(group), pick(d in group where ...): drawn at random",
-          also=("choice", "sample", "draw"), meaning=_whole_group),
+          also=("choice", "sample", "draw", "random", "one_of"), meaning=_whole_group),
     Value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y",
           also=("closest",), meaning=_needs_more),
     Value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do",

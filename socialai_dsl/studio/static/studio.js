@@ -12,7 +12,8 @@ import { Writing } from "./writing.js";
 
 /** @typedef {import("./line.js").Reply} Reply */
 
-const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
+const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450, TELL_AFTER = 1000;
+const FIRST_ROOM = "drawing the room; the first one on a machine waits 20 to 70 seconds, while the engine is compiled";
 
 class Studio {
   constructor() {
@@ -55,7 +56,7 @@ class Studio {
     /** @type {Reply[]} drafts that no window shows */ this.others = [];
     this.kept = make("button", { onclick: () => this.offerDrafts(), hidden: true });
     this.findings = make("ul", { class: "findings", "aria-label": "findings" });
-    this.sound = make("p", { class: "quiet" }, "Nothing is wrong.");
+    this.sound = make("p", { class: "quiet", hidden: true }, "Nothing is wrong.");
     this.message = make("p", { class: "message", role: "status" });
     this.title = make("h1", {}, "studio");
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.another({ seed: Number(this.seedField.value) }) });
@@ -135,9 +136,10 @@ class Studio {
   /** @param {boolean} open @param {string} why */
   async connected(open, why) {
     document.body.classList.toggle("offline", !open);
-    this.tell(why);
+    this.tell(open ? "looking for scenarios …" : why);
     if (!open) return;
     await this.list();
+    this.tell("");
     for (const seat of this.invited) await this.line.ask("invite", { seat, seconds: this.seconds });
     if (this.name) {
       await this.keep();
@@ -419,7 +421,9 @@ class Studio {
     }
     this.drawing = true;
     this.pause();
+    const slow = setTimeout(() => this.episode || this.tell(FIRST_ROOM), TELL_AFTER);
     const text = this.editor.text, drawn = await this.line.ask("draw", { path: this.name, text, room: this.place.room });
+    clearTimeout(slow);
     this.drawing = false;
     if (this.again) {
       this.again = false;

@@ -141,7 +141,11 @@ def test_a_file_with_mistakes(file: Path, capsys: Capture) -> None:
 def test_a_file_of_another_kind(file: Path, capsys: Capture) -> None:
     file.write_text("scenario: mine\nextends: dance.yaml\n")
     assert main(["experiment", "plan", str(file)]) == 1
-    assert "S108 this is a file of the kind `scenario`; expected an experiment" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "S108 this is a file of the kind `scenario`; expected an experiment" in told
+    assert "help: it is a file of its own: `experiment: NAME`" in told
+    assert main(["study", "run", str(file)]) == 1
+    assert "help: it is a file of its own: `study: NAME`" in capsys.readouterr().err
 
 
 def test_validate_knows_experiments(file: Path, capsys: Capture) -> None:

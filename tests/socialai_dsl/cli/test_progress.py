@@ -1,6 +1,7 @@
 """Progress without a terminal: plain lines, numbers that make sense."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,12 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(progress.time, "monotonic", clock)
     return clock
+
+
+def test_one_of_a_kind_is_singular() -> None:
+    program = socialai_dsl.compile(socialai_dsl.load("help"))
+    one = replace(program, actions=program.actions[:1])
+    assert progress._size(one) == "1 action, 4 utterances, 9 words"
 
 
 class Training:

@@ -29,7 +29,7 @@ identified = load(identify)
 identified(make_book(arrays), 1)
 print(arrays[0][0, 0], sum(identified.stats.cache_hits.values()), sum(identified.stats.cache_misses.values()))
 """
-NOTICE = "socialai: compiling the engine, once for this machine: 20 to 60 seconds\n"
+NOTICE = "socialai: compiling the engine, once for this machine: 20 to 70 seconds\n"
 PLAY = """
 import hashlib, sys, numpy as np, socialai_dsl as sd
 _, steps, rows, *names = sys.argv

@@ -14,7 +14,7 @@ from socialai_dsl.engine.jit import is_interpreted
 
 ROOT = Path(__file__).parents[3]
 PROCESSES = 16
-NOTICE = "socialai: compiling the engine, once for this machine: 20 to 60 seconds\n"
+NOTICE = "socialai: compiling the engine, once for this machine: 20 to 70 seconds\n"
 LOOK = """
 import socialai_dsl as sd
 env = sd.make("talkitout")

@@ -79,6 +79,7 @@ def test_encode_action(given: Any, expected: list[int]) -> None:
         ((9, None, None), "from 0 to 6"),
         ((None, 1, None), "both or neither"),
         ((None, "Open sesami"), "did you mean 'Open sesame'"),
+        ((None, "I would like to leave"), "which the grammar cannot say; expected a text such as"),
         ("forward", "expected \\(body action"),
         ((1,), "expected \\(body action"),
         ((True, None), "expected a number"),

@@ -20,6 +20,8 @@ from tests.fuzzing.playground import listening
 FILES = {
     "shipped/market.yaml": "scenario: market\nhorizon: 10\ncast:\n  anna: {name: Anna}\n  bob: {name: Bob}\n",
     "shipped/market_quiet.yaml": "variant: market_quiet\nof: market.yaml\nremove: [cast.bob]\n",
+    "shipped/market.tests.yaml": "tests_of: market.yaml\n",
+    "shipped/market_quiet.tests.yaml": "tests_of: market_quiet.yaml\n",
     "shipped/market_quiet_late.yaml": "variant: market_quiet_late\nof: market_quiet.yaml\nset: {horizon: 99}\n",
     "shipped/market_swap.yaml": "variant: market_swap\nof: market.yaml\nset: {cast.anna.name: Swapped}\n",
     "shipped/garden.yaml": "scenario: garden\nhorizon: 20\n",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import socialai_dsl as sd
 from socialai_dsl.checking.briefing import UNTOLD
@@ -18,6 +20,7 @@ from socialai_dsl.llm.view import LastStep
 from socialai_dsl.studio.judging import judge_claims, judge_tests
 from socialai_dsl.studio.messages import RefusalError, Room, Shown
 from socialai_dsl.studio.session import Casting, Session
+from socialai_dsl.studio.worker import Desk
 from tests.socialai_dsl.studio.shy import SHY
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -305,6 +308,24 @@ def test_mistakes_are_found_before_anything_is_played(tmp_path: Path) -> None:
         assert found["findings"][0]["code"].startswith("S")
     with pytest.raises(RefusalError, match="there are no tests yet"):
         judge_tests(path, SHY[: SHY.index("tests:")])
+
+
+def test_a_mistake_in_another_file_is_told_with_its_place(tmp_path: Path) -> None:
+    """As the script of a template is one once its scenario is rewritten."""
+    path = tmp_path / "shy.yaml"
+    path.write_text(SHY)
+    script = {"cast.agent.frame": "go", "frames.go": {"steps": [{"do": "face(nobody_here)"}]}}
+    (tmp_path / "shy_oracle.yaml").write_text(
+        yaml.safe_dump({"variant": "shy_oracle", "of": "shy.yaml", "set": script})
+    )
+    (found,) = judge_claims(str(path), SHY)["findings"]
+    assert (found["file"].endswith("shy_oracle.yaml"), found["code"]) == (True, "S201")
+    desk = Desk(tmp_path)
+    assert json.loads(desk.answer(json.dumps({"id": 1, "do": "draw", "path": "shy.yaml", "text": SHY})))
+    begin = {"id": 2, "do": "begin", "room": {"seed": 0}, "player": "script", "variant": "+oracle"}
+    refused = json.loads(desk.answer(json.dumps(begin)))["refused"]
+    assert "shy_oracle.yaml:" in refused
+    assert "S201" in refused
 
 
 def test_an_episode_begins_again_where_it_began(session: Session) -> None:
