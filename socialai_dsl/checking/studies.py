@@ -134,9 +134,14 @@ def is_model(who: str) -> bool:
     return who.startswith(MODEL_PREFIX)
 
 
+def rival_of(who: str) -> str | None:
+    """The rival of the scenario that is meant, by its name there; None if somebody else is."""
+    return who.removeprefix(RIVAL_PREFIX) if who.startswith(RIVAL_PREFIX) else None
+
+
 def is_rival(who: str) -> bool:
     """Whether a rival of the scenario is meant."""
-    return who.startswith(RIVAL_PREFIX)
+    return rival_of(who) is not None
 
 
 def is_trained(who: str) -> bool:
@@ -146,8 +151,7 @@ def is_trained(who: str) -> bool:
 
 def rival_of_agent(block: Block) -> str | None:
     """The rival that plays the agent of a block, now or when a person leaves; None if none does."""
-    who = players_of(block).get(AGENT, "")
-    return who.removeprefix(RIVAL_PREFIX) if is_rival(who) else None
+    return rival_of(players_of(block).get(AGENT, ""))
 
 
 def scripts_agent(block: Block) -> bool:
@@ -219,8 +223,9 @@ def check_seats(study: LoadedStudy, number: int, loaded: Loaded, bag: Diagnostic
                 else "one of " + ", ".join(WHO)
             )
             bag.error("S704", f"there is no script for `{seat}` of `{loaded.name}`", span, hint=hint)
-        if seat == AGENT and is_rival(who):
-            _check_rival(who.removeprefix(RIVAL_PREFIX), loaded, span, bag)
+        rival = rival_of(who)
+        if seat == AGENT and rival is not None:
+            _check_rival(rival, loaded, span, bag)
     return len(bag) == known
 
 

@@ -21,6 +21,7 @@ SIMULATED: Final = "; all of them simulated, in a rehearsal"
 
 EXAMPLES: Final = (
     ("socialai study rehearse asking.yaml", "simulated participants, in a minute"),
+    ("socialai study rehearse asking.yaml --also rival:first_answer", "and a rival among them"),
     ("socialai study run asking.yaml --links 2", "serve it, with links for two people"),
     ("socialai study data asking.yaml", "the tables of what they did"),
 )
@@ -54,7 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "rehearse", help="let simulated participants take part, and say what came of it"
     )
     rehearse.add_argument(
-        "--participants", type=positive, default=12, metavar="N", help="how many (default: 12)"
+        "--participants", type=positive, metavar="N", help="how many (default: two of each kind, 12)"
+    )
+    rehearse.add_argument(
+        "--also",
+        action="append",
+        default=[],
+        metavar="AGENT",
+        help="a further kind of participant: shipped:NAME, the path of a checkpoint or a run's folder, rival:NAME or "
+        "llm:MODEL; may be repeated",
     )
     rehearse.add_argument(
         "--pace",
@@ -66,9 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     rehearse.add_argument(
         "--speed",
         type=number_between(0.1, 1000),
-        default=50.0,
         metavar="X",
-        help="times faster than real time (default: 50)",
+        help="times faster than real time (default: 50, or 1 where a language model plays)",
     )
     rehearse.add_argument(
         "--seed", type=seed, default=0, metavar="S", help="of what they choose by chance (default: 0)"
@@ -125,8 +133,9 @@ def _run(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
 
 def _rehearse(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
     require_server()
-    from socialai_dsl.study.rehearsal import rehearse
+    from socialai_dsl.study.rehearsal import KINDS, rehearse
 
+    kinds = (*KINDS, *arguments.also)
     progress = ProgressLine(sys.stderr)
     with tempfile.TemporaryDirectory() as made:
         folder = arguments.out or Path(made)
@@ -137,9 +146,10 @@ def _rehearse(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
             found = rehearse(
                 loaded,
                 folder,
-                arguments.participants,
+                arguments.participants or 2 * len(kinds),
                 arguments.pace,
                 arguments.speed,
+                kinds,
                 seed=arguments.seed,
                 say=progress.show,
             )

@@ -489,8 +489,7 @@ class Live:
         named = models_of(self._study)
         if not named:
             return None
-        if find_spec("httpx") is None:
-            raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
+        require_models()
         from socialai_dsl.study.models import Endpoints
 
         return Endpoints(named, asked_by(self._study, self._loaded.folder))
@@ -846,6 +845,12 @@ class Live:
         for number, name in enumerate(self._loaded.pictures):
             made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
         return made
+
+
+def require_models() -> None:
+    """Say how to install what language models need if it is missing. Raises UsageError."""
+    if find_spec("httpx") is None:
+        raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
 
 
 def agent_of(who: str, folder: Path, env: Any) -> Any:

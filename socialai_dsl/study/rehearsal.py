@@ -8,12 +8,12 @@ import random
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import uvicorn
 from websockets.asyncio.client import ClientConnection, connect
@@ -21,15 +21,32 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from socialai_dsl.checking.loaded import unscripted
-from socialai_dsl.checking.studies import LoadedStudy, block_name, persons_of
+from socialai_dsl.checking.studies import (
+    LoadedStudy,
+    asked_by,
+    block_name,
+    is_model,
+    is_rival,
+    is_trained,
+    models_of,
+    persons_of,
+)
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.frontend import closest_script
+from socialai_dsl.envs.seats import RANDOM, SCRIPT
+from socialai_dsl.episodes.play import AGENT, Seat
+from socialai_dsl.errors import UsageError
+from socialai_dsl.frontend import closest_script, load, variant_of
 from socialai_dsl.schema.study import PERSON
-from socialai_dsl.study.arena import Arena, Episode
+from socialai_dsl.study.arena import Action, Arena, Episode
+from socialai_dsl.study.live import agent_of, require_models
 from socialai_dsl.study.messages import Screen
 from socialai_dsl.study.replay import StudyData, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of
+from socialai_dsl.trainer.config import RIVAL_PREFIX
+
+if TYPE_CHECKING:  # it needs httpx, which is only there if language models were asked for
+    from socialai_dsl.study.models import Endpoints, ModelSeat
 
 KINDS: Final = ("script", "random", "slow", "leaving", "reloading", "cheating")
 """What simulated participants are like, in turn."""
@@ -57,6 +74,7 @@ class Course:
         kind: what it is like. seconds: that it took, in the study's time. finished: whether it came to the end.
         acts: that it chose. waits: seconds from each act to the next picture, of the clock on the wall.
         screens: kinds of screens that it saw. left: whether it left by itself.
+        by_chance: acts of an agent that it chose by chance, as the agent does not play there, or failed.
     """
 
     kind: str
@@ -66,6 +84,7 @@ class Course:
     waits: list[float] = field(default_factory=list)
     screens: Counter[str] = field(default_factory=Counter)
     left: bool = False
+    by_chance: int = 0
 
 
 @dataclass(frozen=True)
@@ -84,12 +103,16 @@ class Rehearsal:
         done = [one for one in self.courses if one.finished]
         left = sum(one.left for one in self.courses)
         yield f"{len(self.courses)} simulated participants, {len(done)} finished, {left} left by themselves"
-        for kind in dict.fromkeys(one.kind for one in self.courses):
+        kinds = dict.fromkeys(one.kind for one in self.courses)
+        for kind in kinds:
             own = [one for one in self.courses if one.kind == kind]
             took = [one.seconds / 60 for one in own if one.finished]
             said = f", {median(took):.1f} min (median), {max(took):.1f} at most" if took else ""
-            yield f"  {kind:<10} {sum(one.finished for one in own)} of {len(own)} finished{said}"
-        people = self.data.tables["participants"]
+            chance, acts = sum(one.by_chance for one in own), sum(one.acts for one in own)
+            said += f", {chance} of {acts} acts by chance" if chance else ""
+            wide = max(map(len, (*KINDS, *kinds)))
+            yield f"  {kind:<{wide}} {sum(one.finished for one in own)} of {len(own)} finished{said}"
+        people, steps = self.data.tables["participants"], self.data.tables["steps"]
         groups = Counter(row["group"] for row in people if row["group"] != "")
         yield "groups: " + ", ".join(f"{group}: {count}" for group, count in sorted(groups.items()))
         persons = {block_name(loaded, n): persons_of(block) for n, block in enumerate(loaded.study.blocks)}
@@ -99,6 +122,8 @@ class Rehearsal:
             played = {(row["game"], row["trial"]) for row in rows}
             stood = len(played & self._with_stand_ins(persons.get(block, ())))
             more = f", {stood} with a stand-in" if stood else ""
+            missed = sum(bool(r["missed"]) and (r["game"], r["trial"]) in played for r in steps)
+            more += f", {missed} steps that a language model missed" if missed else ""
             yield f"  {block}: {len(rows)} episodes, {won / len(rows):.0%} successful{more}"
         excluded = Counter(row["excluded"] for row in people if row["excluded"])
         if excluded:
@@ -125,7 +150,7 @@ def rehearse(
     folder: Path,
     participants: int,
     pace: float = 2.0,
-    speed: float = 50.0,
+    speed: float | None = None,
     kinds: tuple[str, ...] = KINDS,
     seed: int = 0,
     say: Callable[[str], None] = lambda line: None,
@@ -137,16 +162,22 @@ def rehearse(
         folder: for all that is stored; it is there and empty.
         participants: how many.
         pace: seconds that they take for an act or a page, in the study's time.
-        speed: how much faster than the clock on the wall the study's time goes.
-        kinds: what they are like, in turn.
+        speed: how much faster than the clock on the wall the study's time goes; by default 50, or 1 where a language
+            model plays, which takes the time that it takes.
+        kinds: what they are like, in turn: some of `KINDS`, or agents: `rival:NAME`, `llm:MODEL`, `shipped:NAME`, the
+            path of a checkpoint or a run's folder.
         seed: of what they choose by chance.
         say: takes lines about the progress.
 
     Raises:
         OSError: the folder cannot be written.
-        UsageError: it is not empty.
+        UsageError: it is not empty; or an agent is unknown, or plays in no block.
     """
-    courses = asyncio.run(_rehearsed(loaded, folder, participants, pace, speed, kinds, seed, say))
+    minds = {kind: _mind(kind, loaded) for kind in dict.fromkeys(kinds)}
+    if speed is None:
+        models = *models_of(loaded.study), *filter(is_model, kinds)
+        speed = 1.0 if models else 50.0
+    courses = asyncio.run(_rehearsed(loaded, folder, participants, pace, speed, kinds, minds, seed, say))
     return Rehearsal(courses, study_data(loaded, folder))
 
 
@@ -157,11 +188,11 @@ async def _rehearsed(
     pace: float,
     speed: float,
     kinds: tuple[str, ...],
+    minds: Mapping[str, Mind],
     seed: int,
     say: Callable[[str], None],
 ) -> list[Course]:
     server = StudyServer(loaded, folder, "127.0.0.1", clock=lambda: time.monotonic() * speed, simulated=True)
-    scripts = _scripts(loaded)
     with socket.create_server(("127.0.0.1", 0), backlog=1024) as listening:
         serving = uvicorn.Server(config_of(server))
         task = asyncio.create_task(serving.serve(sockets=[listening]))
@@ -174,25 +205,90 @@ async def _rehearsed(
             path = await server.invite()
             kind = kinds[number % len(kinds)]
             own = random.Random(rng.random())
-            simulated = Simulated(server, at, path.removeprefix("/p/"), kind, pace, speed, own, scripts)
+            simulated = Simulated(server, at, path.removeprefix("/p/"), kind, pace, speed, own, minds[kind])
             people.append(asyncio.create_task(simulated.take_part()))
         for ended, ending in enumerate(asyncio.as_completed(people), start=1):
             await ending
             say(f"{ended} of {participants}")
         serving.should_exit = True
         await task
+        for mind in minds.values():
+            await mind.close()
     return [task.result() for task in people]
 
 
-def _scripts(loaded: LoadedStudy) -> dict[int, Arena]:
-    """What scripts look into: the played scenarios in which the agent follows a frame, where there are some."""
+@dataclass(frozen=True)
+class Mind:
+    """What chooses for simulated participants of a kind, in rooms that are played beside those of the server.
+
+    Attributes:
+        who: `script`, or an agent. arenas: number of a block -> what it looks into there; elsewhere chance plays.
+        endpoints: where a language model is asked.
+    """
+
+    who: str
+    arenas: Mapping[int, Arena]
+    endpoints: Endpoints | None = None
+
+    def plays(self, block: int, seat: Seat) -> bool:
+        """Whether it has a move of its own on a seat of a block: scripts and rivals are frames of the agent."""
+        return block in self.arenas and (seat == AGENT or is_trained(self.who) or is_model(self.who))
+
+    async def close(self) -> None:
+        """Let connections go."""
+        if self.endpoints is not None:
+            await self.endpoints.close()
+
+
+def _mind(kind: str, loaded: LoadedStudy) -> Mind:
+    """What chooses for a kind of participants. Raises UsageError for an agent that is unknown or plays nowhere."""
+    if kind in KINDS:
+        return Mind(SCRIPT, {} if kind == RANDOM else _framed(loaded, None))
+    if is_model(kind):
+        require_models()
+        from socialai_dsl.study.models import Endpoints
+
+        arenas = {number: Arena(one) for number, one in loaded.played.items()}
+        return Mind(kind, arenas, Endpoints([kind], asked_by(loaded.study, loaded.folder)))
+    if is_rival(kind):
+        arenas, why = (
+            _framed(loaded, kind.removeprefix(RIVAL_PREFIX)),
+            "no scenario of the study has this rival",
+        )
+    else:
+        arenas, why = _fitting(kind, loaded)
+    if not arenas:
+        raise UsageError(f"{kind}: {why}")
+    return Mind(kind, arenas)
+
+
+def _framed(loaded: LoadedStudy, rival: str | None) -> dict[int, Arena]:
+    """The scenarios of a study in which the agent follows its script, or a rival, where there is one."""
     found = {}
     for number, name, _ in loaded.named():
         with suppress(ScenarioError):
-            closest = closest_script(name, loaded.played[number])
-            if not unscripted(closest.loaded):
-                found[number] = Arena(closest.loaded)
+            one = (
+                load(variant_of(name, rival)) if rival else closest_script(name, loaded.played[number]).loaded
+            )
+            if not unscripted(one):
+                found[number] = Arena(one)
     return found
+
+
+def _fitting(agent: str, loaded: LoadedStudy) -> tuple[dict[int, Arena], str]:
+    """The scenarios of a study that a trained agent can play, and why it cannot play the others."""
+    found, why = {}, ""
+    for number, one in loaded.played.items():
+        arena = Arena(one)
+        try:
+            agent_of(agent, Path(), arena.take())
+        except UsageError:
+            raise
+        except ValueError as error:
+            why = str(error)
+        else:
+            found[number] = arena
+    return found, why
 
 
 class Simulated:
@@ -207,11 +303,12 @@ class Simulated:
         pace: float,
         speed: float,
         rng: random.Random,
-        scripts: dict[int, Arena],
+        mind: Mind,
     ) -> None:
         self._server, self._at, self._code, self._kind = server, at, code, kind
-        self._pace, self._speed, self._rng, self._scripts = pace, speed, rng, scripts
+        self._pace, self._speed, self._rng, self._mind = pace, speed, rng, mind
         self._mirror: tuple[str, Episode] | None = None
+        self._model: ModelSeat | None = None
         self._course = Course(kind)
         self._game: Screen = {}
         self._patience = rng.randint(5, 60) if kind == "leaving" else None
@@ -251,7 +348,7 @@ class Simulated:
             if screen["do"] == "end":
                 self._course.finished = True
                 return
-            answer = self._answer(screen) if screen["on"] != answered else None
+            answer = await self._answer(screen) if screen["on"] != answered else None
             if answer is None:
                 continue
             took = self._pace * (3 if self._kind == "slow" else 1) * self._rng.uniform(0.5, 1.5)
@@ -272,7 +369,7 @@ class Simulated:
                 if self._kind == "reloading" and self._rng.random() < 0.1:
                     return
 
-    def _answer(self, screen: Screen) -> dict[str, Any] | None:
+    async def _answer(self, screen: Screen) -> dict[str, Any] | None:
         on = screen["on"]
         match screen["do"]:
             case "consent" | "page":
@@ -288,7 +385,7 @@ class Simulated:
             case "play" if screen.get("ended"):
                 return {"do": "go", "on": on}
             case "play":
-                movement, said = self._act()
+                movement, said = await self._act()
                 now = time.monotonic() * 1000 * self._speed % 1e9
                 return {
                     "do": "act",
@@ -307,10 +404,11 @@ class Simulated:
             str(self._rng.choice(question["options"])) if question["kind"] == "choice" else f"({self._kind})"
         )
 
-    def _act(self) -> tuple[str | None, str | None]:
-        scripted = self._script() if self._kind != "random" else None
-        if scripted is not None:
-            return scripted
+    async def _act(self) -> tuple[str | None, str | None]:
+        own = await self._own()
+        if own is not None:
+            return own
+        self._course.by_chance += self._kind not in KINDS
         movement = self._rng.choice([*self._game["actions"], None])
         said = (
             self._rng.choice(self._game["phrases"])
@@ -319,21 +417,46 @@ class Simulated:
         )
         return movement, said
 
-    def _script(self) -> tuple[str | None, str | None] | None:
-        """What the script does now, from a room that is played alike; None where there is none for this seat."""
+    async def _own(self) -> tuple[str | None, str | None] | None:
+        """What its mind does now, from a room that is played alike; None where it has no move here."""
         progress = self._server.live.progress
         person = progress.people[self._server.person(self._code)]
         game = progress.games.get(person.game or "")
-        if game is None or game.episode is None or game.block not in self._scripts:
+        if game is None or game.episode is None:
             return None
-        if progress.seat_of(game, person.id) != "agent":
+        seat = progress.seat_of(game, person.id)
+        if not self._mind.plays(game.block, seat):
             return None
-        arena, name = self._scripts[game.block], f"{game.id} {game.episode.number}"
+        arena, name = self._mind.arenas[game.block], f"{game.id} {game.episode.number}"
         if self._mirror is None or self._mirror[0] != name:
-            env = arena.take()
-            self._mirror = name, Episode(arena, {}, reset_of(game.block, game.episode.room), env)
+            self._mirror = name, self._beginning(arena, seat, name, reset_of(game.block, game.episode.room))
         episode = self._mirror[1]
         for step in game.episode.steps[episode.t :]:
+            if self._model is not None and step["by"][seat] != PERSON:
+                self._model.passed()
             episode.step(step["acts"])
-        action = episode.chosen("agent", "script")
-        return None if action is None or episode.ending is not None else arena.words(action)
+        if episode.ending is not None:
+            return None
+        action = await self._chosen(episode, seat)
+        return None if action is None else arena.words(action)
+
+    def _beginning(self, arena: Arena, seat: Seat, name: str, reset: dict[str, Any]) -> Episode:
+        """A room like the server's in which its mind looks from the seat."""
+        env, who = arena.take(), self._mind.who
+        agents = {seat: lambda: agent_of(who, Path(), env)} if is_trained(who) else {}
+        if self._mind.endpoints is not None:
+            from socialai_dsl.study.models import ModelSeat
+
+            self._model = ModelSeat(arena, seat, who, self._mind.endpoints)
+        watching = () if self._model is None else (self._model,)
+        return Episode(arena, agents, reset, env, watching, name)
+
+    async def _chosen(self, episode: Episode, seat: Seat) -> Action | None:
+        if self._model is None:
+            return episode.chosen(seat, self._mind.who)
+        from socialai_dsl.study.models import ModelFailed
+
+        try:
+            return (await self._model.act())[1]
+        except ModelFailed:
+            return None
