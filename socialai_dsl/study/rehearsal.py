@@ -26,10 +26,10 @@ from socialai_dsl.checking.studies import (
     asked_by,
     block_name,
     is_model,
-    is_rival,
     is_trained,
     models_of,
     persons_of,
+    rival_of,
 )
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs.seats import RANDOM, SCRIPT
@@ -43,7 +43,6 @@ from socialai_dsl.study.messages import Screen
 from socialai_dsl.study.replay import StudyData, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of
-from socialai_dsl.trainer.config import RIVAL_PREFIX
 
 if TYPE_CHECKING:  # it needs httpx, which is only there if language models were asked for
     from socialai_dsl.study.models import Endpoints, ModelSeat
@@ -250,11 +249,9 @@ def _mind(kind: str, loaded: LoadedStudy) -> Mind:
 
         arenas = {number: Arena(one) for number, one in loaded.played.items()}
         return Mind(kind, arenas, Endpoints([kind], asked_by(loaded.study, loaded.folder)))
-    if is_rival(kind):
-        arenas, why = (
-            _framed(loaded, kind.removeprefix(RIVAL_PREFIX)),
-            "no scenario of the study has this rival",
-        )
+    rival = rival_of(kind)
+    if rival is not None:
+        arenas, why = _framed(loaded, rival), "no scenario of the study has this rival"
     else:
         arenas, why = _fitting(kind, loaded)
     if not arenas:
