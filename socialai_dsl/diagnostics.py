@@ -77,7 +77,7 @@ CODES: Final[dict[str, str]] = {
     "S402": "a value that cannot be said",
     "W403": "a right answer that is not among those of the probe",
     "W404": "a probe with a single answer",
-    "S405": "a text that is not one line, or a name that reads like two",
+    "S405": "a text that is not one line, or a name that reads as something else",
     "W406": "texts that look alike and are not",
     "W407": "a text that reads like a value",
     # S5xx: variants, parameters and files that belong together

@@ -38,6 +38,18 @@ FINISHED: Final = "finished"
 TRUTHS: Final = ("no", "yes")
 """How a truth value is answered."""
 
+YOU: Final = "You"
+"""How texts and pages call whoever reads them, also before the lines that are its own."""
+SURFACES: Final = ("wall", "fence", "lava", "floor", "platform")
+"""What usually covers many cells, which texts tell of by its extent."""
+OUT_OF_SIGHT: Final = "cells out of sight"
+_OWN_WORDS: Final = re.compile(
+    # What is seen, heard and told: `You see:`, `Your reply was not understood:`, `2 steps ahead: ...`, `a wall: ...`.
+    rf"you\b|your reply\b|\d+ steps?\b|an? (?:.* )?(?:{'|'.join(SURFACES)})\Z|{OUT_OF_SIGHT}\Z"
+    # Questions, and what marks a reply: `A question, apart from your turns:`, `Act: left`.
+    r"|a question\b|the answer is one of\Z|answer\Z|act(?:ion)?\Z"
+)
+"""What stands before a colon in texts for language models, beside the names of who speaks."""
 _WORD: Final = re.compile(r"[a-z0-9']+")
 _FINAL: Final = ".!?\u3002"
 """Marks that may end a sentence, the ideographic full stop among them; wide forms of the others are folded."""
@@ -73,6 +85,11 @@ def normal(text: str) -> str:
     """A text as hearing compares it: folded, without final full stops, `!` or `?`, and how many blanks there are."""
     text = " ".join(folded(text).split())
     return text.rstrip(_FINAL).rstrip() or text
+
+
+def is_own_word(name: str) -> bool:
+    """Whether a line of somebody so called, `NAME: text`, reads as one of what language models are told themselves."""
+    return _OWN_WORDS.match(" ".join(folded(name).split())) is not None
 
 
 def first_alike(text: str, known: dict[str, str]) -> str | None:

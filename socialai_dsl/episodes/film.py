@@ -20,6 +20,7 @@ from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.traces.endings import Ending
 from socialai_dsl.traces.state import names_of
 from socialai_dsl.traces.steps import Step, describe_step, spoken
+from socialai_dsl.vocabulary import YOU
 
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500
@@ -83,7 +84,7 @@ class RecordedEpisode:
                 lines.append(f"{steps[0].t:>4}  {steps[0].action:<8}   (until step {steps[-1].t})")
                 continue
             for step in steps:
-                said = f'   You: "{step.said}"' if step.said is not None else ""
+                said = f'   {YOU}: "{step.said}"' if step.said is not None else ""
                 lines.append(f"{step.t:>4}  {step.action:<8}{said}".rstrip())
                 lines += [f"{'':17}{printable(line)}" for line in step.heard]
         lines += [

@@ -9,7 +9,7 @@ from socialai_dsl.library import types_by_code
 from socialai_dsl.program import GESTURES, NO_GESTURE, EntityColumn, Header, Program, unpack_held
 from socialai_dsl.render.gestures import gesture_shown
 from socialai_dsl.render.marks import LookWords, marks_of
-from socialai_dsl.vocabulary import COLORS, NPC, UNSEEN
+from socialai_dsl.vocabulary import COLORS, NPC, OUT_OF_SIGHT, SURFACES, UNSEEN
 
 LOOKS: Final = 4
 """Channels that say what things look like; those behind them are gestures, and what is carried."""
@@ -18,7 +18,6 @@ COMPASS: Final = ("east", "south", "west", "north")
 RELATIVE: Final = ("past you", "to your left", "away from you", "to your right")
 """Directions of others in words, absolute and as seen from the agent, which they may also face: `directions_at`."""
 
-_SURFACES: Final = ("wall", "fence", "lava", "floor", "platform")
 _ACTS: Final = {
     "forward": "just stepped forward",
     "left": "just turned left",
@@ -57,7 +56,7 @@ def directions_at(ahead: int, right: int, directions: tuple[str, ...]) -> tuple[
 def is_surface(cell: Cell) -> bool:
     """Whether a cell shows what usually covers many cells, or nothing because it is out of sight."""
     found = types_by_code().get(cell[0])
-    return cell[0] == UNSEEN or (found is not None and found.name in _SURFACES)
+    return cell[0] == UNSEEN or (found is not None and found.name in SURFACES)
 
 
 def facts(
@@ -87,7 +86,7 @@ def _facts(
 ) -> dict[str, Any]:
     kind, colour, status, orientation = cell[:LOOKS]
     if kind == UNSEEN:
-        return {"what": "cells out of sight"}
+        return {"what": OUT_OF_SIGHT}
     if kind == NPC:
         what = kinds.get(status, f"person of look {status}")
         look = {"what": what, "color": COLORS[colour], "facing": directions[orientation]}
@@ -96,7 +95,7 @@ def _facts(
     if found is None:
         return {"what": f"thing {kind}.{status}.{orientation}", "color": COLORS[colour]}
     told = {"what": found.name.replace("_", " ")}
-    if found.name not in _SURFACES or colour != found.color:
+    if found.name not in SURFACES or colour != found.color:
         told["color"] = COLORS[colour]
     if len(found.states) > 1:
         shown = {found.shown.get(i, (i, 0))[0]: state for i, state in enumerate(found.states)}
@@ -113,7 +112,7 @@ def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
         told: see `facts`.
         shared: words of several looks, beside which a thing has the name of the look.
     """
-    looks = {} if told["what"].startswith("cells") else told.get("looks", {})
+    looks = {} if told["what"] == OUT_OF_SIGHT else told.get("looks", {})
     plain = [
         word
         for word in looks.values()
@@ -123,7 +122,7 @@ def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
     doing = [f"{look} {word}" for look, word in looks.items() if word not in plain]
     doing += [f"{key} {told[key]}" for key in ("facing", "moving", "pointing", "carrying") if key in told]
     doing += [told["last"]] if "last" in told else []
-    if told["what"].startswith("cells"):
+    if told["what"] == OUT_OF_SIGHT:
         return named
     return ", ".join([_with_article(named), *doing])
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from socialai_dsl.render.canvas import INK, PAPER, WHITE, Rgb, mix
+from socialai_dsl.vocabulary import YOU
 
 _MUTED: Final[Rgb] = (118, 120, 128)
 _OWN: Final[Rgb] = (178, 34, 40)
@@ -33,7 +34,7 @@ class DialogueLine:
 
     Attributes:
         t: the step in which it was said, counted from 1.
-        speaker: a name, "You" for the agent, "" where the scenario hides names.
+        speaker: a name, `YOU` for the agent, "" where the scenario hides names.
         text: what was said.
     """
 
@@ -44,7 +45,7 @@ class DialogueLine:
     @property
     def own(self) -> bool:
         """Whether the agent said it."""
-        return self.speaker == "You"
+        return self.speaker == YOU
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from socialai_dsl.semantics.resolver import Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import surviving
 from socialai_dsl.semantics.terms import Line, Term
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import composed
+from socialai_dsl.vocabulary import composed, is_own_word
 
 Spoken = Mapping[str, Mapping[DataPath, Line]]
 """Member of the cast -> what it says, by place."""
@@ -29,6 +29,12 @@ def check_speakers(resolver: Resolver, spoken: Spoken) -> None:
                     what = "a colon" if mark.group() == ":" else "` to `"
                     message = f"the name `{name}` contains {what}, so its lines read as another speaker's"
                     hint = "what is heard reads `Ann: text`, or `Ann to Bob: text`; leave it out of names"
+                    findings.error("S405", message, findings.at(path), hint=hint)
+                elif is_own_word(name):
+                    message = (
+                        f"the name `{name}` is one of the words with which texts tell what is seen and heard"
+                    )
+                    hint = "language models read `You hear:` and `2 steps ahead: a door`; choose another name"
                     findings.error("S405", message, findings.at(path), hint=hint)
     tone = symbols.scenario.observe.tone
     look = symbols.scenario.looks.get(tone) if tone is not None else None

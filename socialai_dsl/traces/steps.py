@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.render.panel import DialogueLine
+from socialai_dsl.vocabulary import YOU
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Step:
     @property
     def dialogue(self) -> list[DialogueLine]:
         """The lines of this step, the agent's first."""
-        own = [DialogueLine(self.t, "You", self.said)] if self.said is not None else []
+        own = [DialogueLine(self.t, YOU, self.said)] if self.said is not None else []
         return own + [heard_line(self.t, line) for line in self.heard]
 
 

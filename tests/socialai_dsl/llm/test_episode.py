@@ -1,6 +1,8 @@
 """Scripts that play through text do what they do without it; replies that mean nothing do no harm."""
 
 import json
+import random
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,7 +16,9 @@ from socialai_dsl.llm import Episode
 from socialai_dsl.llm.actions import Action
 from socialai_dsl.llm.episode import CONTEXT, INVALID, STOPPED, TextSeat, scripted_reply
 from socialai_dsl.llm.prompting import PromptOptions
+from socialai_dsl.llm.questions import put
 from socialai_dsl.llm.view import Style
+from socialai_dsl.vocabulary import is_own_word
 from tests.quick import one_in
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -231,3 +235,34 @@ def test_what_an_act_tells_stands_before_what_is_seen_or_is_a_key(style: Style, 
     else:
         assert "Wait here." not in first
         assert second.startswith("Wait here.\n\nYou see")
+
+
+def told(name: str, style: Style) -> Iterator[str]:
+    """What is told and asked in an episode of a model that now and then makes no sense, its own replies included."""
+    replies = random.Random(0)
+    episode = Episode(name, style=style, on_invalid="retry", probes=sd.load(name))
+    yield episode.reset(test_episode=0)
+    done = False
+    while not done:
+        while episode.question is not None:
+            yield put(episode.question, "text")
+            episode.answer("")
+        reply = replies.choice(["Act: left", "Act: forward", "hm"])
+        turn = episode.step(reply)
+        done = turn.done
+        yield from (reply, turn.text)
+
+
+@pytest.mark.parametrize("style", ["prose", "grid"])
+def test_nobody_may_be_called_what_texts_say_themselves(style: Style) -> None:
+    """Whatever they say before a colon is no name, so that `NAME: text` is always somebody's line."""
+    begun = set()
+    for name in ("talkitout", "help", "novel/sally_anne", "together/help_together"):
+        speakers = {line.partition(":")[0] for line in sd.compile(sd.load(name)).lines}
+        for line in (line for text in told(name, style) for line in text.splitlines()):
+            before, colon, _ = line.removeprefix("- ").partition(":")
+            begun |= {before} - speakers if colon else set()
+    begun -= {"Do not act now. Reply with one line in this form"}
+    assert {"You see", "You hear", "Act", "Answer", "A question, apart from your turns"} <= begun
+    assert style == "grid" or {"a wall", "a lava", "2 steps to the right"} <= begun
+    assert not [before for before in begun if not is_own_word(before)]

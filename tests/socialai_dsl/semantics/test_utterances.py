@@ -84,6 +84,13 @@ def test_whatever_is_said_or_named_is_one_line(examine, place, text):
         ('"\U0001f98a"', '"\U0001f43b"', []),
         ('"Bob: Ann"', "Bob", ["S405"]),
         ('"Bob\uff1a Ann"', "Bob", ["S405"]),
+        ("You", "Bob", ["S405"]),
+        ("you  hear", "Bob", ["S405"]),
+        ("Young Ann", "Steps", []),
+        ("ACT", "Actor", ["S405"]),
+        ("Answer", "Answerer", ["S405"]),
+        ("2 steps ahead", "Two steps", ["S405"]),
+        ("A wall", "Wall", ["S405"]),
     ],
 )
 def test_names_are_one_speaker_to_all_who_hear_them(examine, name, others, codes):
