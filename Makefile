@@ -34,7 +34,7 @@ test-all: $(STAMP) ## run the tests, and those that play or train more, or start
 
 test-pages: $(STAMP) node_modules/.package-lock.json ## check the scripts of the pages, and use the pages in a real browser, Chromium
 	npm run --silent check
-	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[pages,studio]'
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs,pages,studio]'
 	$(BIN)/python -m pytest tests/browser $(ARGS)
 
 test-long: $(STAMP) ## run the tests that take minutes

@@ -34,3 +34,14 @@ exclude_patterns = ["_build", "results"]
 nitpicky = True
 # Types of other libraries, and of our own that no page shows.
 nitpick_ignore_regex = [("py:.*", ".*")]
+
+
+def setup(app):
+    """Let the keyboard scroll what is wider than the screen, and tell screen readers how deep a heading is."""
+
+    def reachable(app, page, template, context, document):
+        for part in ("body", "furo_navigation_tree"):
+            html = context.get(part, "").replace("<pre>", '<pre tabindex="0">')
+            context[part] = html.replace('role="heading">', 'role="heading" aria-level="2">')
+
+    app.connect("html-page-context", reachable, priority=900)  # Furo makes its menu before

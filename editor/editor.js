@@ -180,7 +180,7 @@ export class Editor {
       yaml(),
       syntaxHighlighting(words),
       lintGutter(),
-      EditorView.contentAttributes.of({ "aria-label": `text of ${name}` }),
+      EditorView.contentAttributes.of({ "aria-label": `text of ${name}`, tabindex: "0" }),
       EditorView.updateListener.of((update) => update.docChanged && changed(update.state.doc.toString())),
       look,
       verdicts,

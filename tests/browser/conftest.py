@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,6 +16,18 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 _QUIET = ["--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
+STUDY = """\
+study: paged
+language: {language}
+consent: I agree.
+instructions: [Walk.]
+blocks:
+- {{scenario: talkitout_no_liar, episodes: 1}}
+questions:
+- {{id: how, ask: How was it?}}
+- {{id: hard, ask: How hard?, kind: scale, from: 1, to: 3}}
+end: {{code: DONE-1}}
+"""
 
 
 @pytest.fixture(scope="session")
@@ -40,3 +55,29 @@ def page(browser: Browser) -> Iterator[Page]:
     yield opened
     context.close()
     assert failures == []
+
+
+@pytest.fixture
+def link(tmp_path: Path) -> Iterator[Callable[[str], str]]:
+    """Starts a server of a study in a language, and returns the link of a participant."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(language: str) -> str:
+        (tmp_path / "study.yaml").write_text(STUDY.format(language=language), encoding="utf-8")
+        command = [sys.executable, "-m", "socialai_dsl", "study", "run", "study.yaml"]
+        process = subprocess.Popen(
+            [*command, "--port", "0", "--out", str(tmp_path / "out"), "--links", "1"],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        assert process.stdout is not None
+        return [process.stdout.readline().strip() for _ in range(4)][3]
+
+    yield start
+    for process in started:
+        process.terminate()
+        process.wait(20)
+        assert process.stdout is not None
+        process.stdout.close()

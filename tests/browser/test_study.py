@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,44 +15,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 ROOT = Path(__file__).parents[2]
-STUDY = """\
-study: paged
-language: {language}
-consent: I agree.
-instructions: [Walk.]
-blocks:
-- {{scenario: talkitout_no_liar, episodes: 1}}
-questions:
-- {{id: how, ask: How was it?}}
-- {{id: hard, ask: How hard?, kind: scale, from: 1, to: 3}}
-end: {{code: DONE-1}}
-"""
-
-
-@pytest.fixture
-def link(tmp_path: Path) -> Iterator[Callable[[str], str]]:
-    """Starts a server of a study in a language, and returns the link of a participant."""
-    started: list[subprocess.Popen[str]] = []
-
-    def start(language: str) -> str:
-        (tmp_path / "study.yaml").write_text(STUDY.format(language=language), encoding="utf-8")
-        command = [sys.executable, "-m", "socialai_dsl", "study", "run", "study.yaml"]
-        process = subprocess.Popen(
-            [*command, "--port", "0", "--out", str(tmp_path / "out"), "--links", "1"],
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        started.append(process)
-        assert process.stdout is not None
-        return [process.stdout.readline().strip() for _ in range(4)][3]
-
-    yield start
-    for process in started:
-        process.terminate()
-        process.wait(20)
-        assert process.stdout is not None
-        process.stdout.close()
 
 
 def test_a_participant_comes_to_the_end_by_the_keyboard_alone(page: Page, link: Callable[[str], str]) -> None:

@@ -14,7 +14,7 @@ export class Counts {
   /** @param {(at: string) => void} open */
   constructor(open) {
     this.open = open;
-    this.rows = make("ul", { class: "rules" });
+    this.rows = make("ul", { class: "rules", tabindex: 0, "aria-label": "all rules" });
     this.root = panel("All rules, and how often each fired", "counts", this.rows);
     /** @type {string[]} of all rules; of a suite behind their member's name and ": " */ this.names = [];
     this.episodes = 0;

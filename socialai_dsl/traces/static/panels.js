@@ -226,7 +226,7 @@ export class Rules {
     this.open = open;
     /** @type {[Episode, number] | null} */ this.shown = null;
     this.who = make("select", { "aria-label": "whose rules", onchange: () => this.shown && this.show(...this.shown) });
-    this.list = make("ul", { class: "rules" });
+    this.list = make("ul", { class: "rules", tabindex: 0, "aria-label": "rules of this step" });
     this.root = panel("Rules: what fired, and why others did not", "why", this.who, this.list);
   }
 
@@ -364,7 +364,7 @@ export class Replies {
   show(episode, step) {
     this.root.hidden = !episode.scenes.some((scene) => scene.moment.replies);
     const items = (episode.scenes[step].moment.replies ?? []).map(({ text, error, seat }) =>
-      make("li", {}, seat ? make("strong", {}, `${seat}: `) : null, text || "(nothing)", error ? make("small", { class: "verdict bad" }, `✗ ${error}`) : null));
+      make("li", { tabindex: 0 }, seat ? make("strong", {}, `${seat}: `) : null, text || "(nothing)", error ? make("small", { class: "verdict bad" }, `✗ ${error}`) : null));
     this.list.replaceChildren(...(items.length ? items : [make("li", { class: "quiet" }, "Before the first step.")]));
   }
 }
