@@ -8,6 +8,7 @@ import sys
 import tomllib
 import zipfile
 from collections.abc import Iterator
+from email import message_from_string
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,29 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
         "no other name is taken"
     )
     assert not [name for name in names if name.startswith(("tests/", "runs/", "benchmarks/"))]
+
+
+@pytest.mark.thorough("builds a wheel")
+def test_an_index_shows_the_readme_with_links_that_lead_somewhere(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = [name for name in archive.namelist() if name.endswith("/METADATA")]
+        metadata = message_from_string(archive.read(name).decode("utf-8"))
+    assert metadata["Description-Content-Type"] == "text/markdown"
+    shown, source = metadata.get_payload(), PROJECT["project"]["urls"]["Source"]
+    assert isinstance(shown, str)
+    found = re.findall(r'\]\(([^)]+)\)|(?:src|srcset|href)="([^"]+)"', shown)
+    addresses = [written or quoted for written, quoted in found]
+    assert len(addresses) > 40
+    assert [address for address in addresses if not address.startswith("https://")] == []
+    ours = [address.removeprefix(f"{source}/") for address in addresses if address.startswith(f"{source}/")]
+    assert {"raw/main/docs/one_room.png", "blob/main/docs/gallery.md"} <= set(ours)
+    for path in ours:
+        (kind, _, file), picture = path.split("#")[0].split("/", 2), path.endswith(".png")
+        assert (kind == "raw") is picture, path
+        assert (ROOT / file).exists(), path
+    line = re.search(r"^\*\*(.+)\.\*\*$", shown, re.MULTILINE)
+    assert line is not None
+    assert metadata["Summary"] == line[1]
 
 
 @pytest.mark.thorough("builds a wheel, and starts its commands")
