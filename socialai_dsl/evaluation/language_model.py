@@ -89,7 +89,7 @@ def let_models_play(
     if find_spec("httpx") is None:
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
     from socialai_dsl.llm.endpoint import EndpointError
-    from socialai_dsl.llm.players import SettingsMismatchError, play_games, transcripts
+    from socialai_dsl.llm.players import SettingsMismatchError, has_transcripts, play_games, transcripts
     from socialai_dsl.llm.view import TextView
 
     folder = out / scenario_folder_name(scenario) / TRANSCRIPTS
@@ -122,7 +122,8 @@ def let_models_play(
     except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
     except EndpointError as error:
-        raise UsageError(f"{error}. Episodes so far are kept in {folder}; the same command goes on") from None
+        kept = f". Replies so far are kept in {folder}; the same command goes on"
+        raise UsageError(f"{error}{kept if has_transcripts(folder) else ''}") from None
     if len(played) < episodes:
         raise RunFailed(
             f"the budget is spent: {len(played)} of {episodes} episodes are over; the same command goes on with "

@@ -56,6 +56,8 @@ _MOST_BYTES: Final = 4_000_000
 _UNREAD: Final = 2
 """How often a completion without a message is asked for again before it counts as the answer."""
 _CITED: Final = 200
+_SHORTEST_KEY: Final = 8
+"""A shorter one is a word such as `none` that servers without keys are given, and stands in other words."""
 
 
 class EndpointError(Exception):
@@ -214,7 +216,8 @@ class Endpoint:
             elif status in _PASSING:
                 what, wait = f"status {status}: {_cited(content)}", _retry_after(headers)
             else:
-                raise self._failure(f"status {status}: {_cited(content)}")
+                moved = f", moved to {headers['location']}" if "location" in headers else ""
+                raise self._failure(f"status {status}{moved}: {_cited(content)}")
         raise self._failure(what)
 
     async def _post(
@@ -243,7 +246,8 @@ class Endpoint:
 
     def _failure(self, what: str) -> EndpointError:
         text = f"model {self.model!r} at {self.address}: {what}"
-        return EndpointError(printable(text.replace(self.key, "***") if self.key else text))
+        hidden = text.replace(self.key, "***") if len(self.key) >= _SHORTEST_KEY else text
+        return EndpointError(printable(hidden))
 
 
 def _completion(content: bytes) -> Completion | None:

@@ -28,28 +28,19 @@ from socialai_dsl.checking.briefing import Briefing, Tell, brief
 from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.envs.asking import probe_names
 from socialai_dsl.episodes.partners import Beside, beside
+from socialai_dsl.frontend import load_experiment
 from socialai_dsl.llm.actions import Mode
 from socialai_dsl.llm.episode import CUT_SHORT, Episode, OnInvalid
 from socialai_dsl.llm.history import WHOLE, left_out
 from socialai_dsl.llm.inspect_session import EPISODES, PROBES, Session
 from socialai_dsl.llm.prompting import Probing, PromptOptions
 from socialai_dsl.llm.view import Style, TextView
+from socialai_dsl.loader.reader import shipped_experiments
 from socialai_dsl.schema.scenario import TEST_SET
 from socialai_dsl.traces.endings import endings_of
 
-TEN: Final = (
-    "talkitout",
-    "help",
-    "dance",
-    "diverse_exit",
-    "novel/sally_anne",
-    "novel/second_order",
-    "novel/gossip",
-    "classics/director_task",
-    "classics/selective_trust",
-    "classics/discrepant_desires",
-)
-"""The scenarios of `suite` unless others are named."""
+PUBLISHED: Final = "minds"
+"""The experiment whose scenarios `suite` has unless others are named."""
 
 
 @task
@@ -98,7 +89,7 @@ def scenario(
 
 @task
 def suite(
-    scenarios: str | Sequence[str] = TEN,
+    scenarios: str | Sequence[str] | None = None,
     episodes: int = 20,
     style: Style = "prose",
     mode: Mode = "text",
@@ -112,7 +103,7 @@ def suite(
     """Episodes of each of several scenarios, a sample each; figures for each scenario as well.
 
     Args:
-        scenarios: paths or names.
+        scenarios: paths or names; None: those of the experiment `minds`, in which every kind of mind plays.
         episodes: how many of each.
         style: see `scenario`, as of all that follow.
         mode: how actions are given.
@@ -127,6 +118,9 @@ def suite(
         ScenarioError: a scenario does not exist, or has mistakes.
         ValueError: an argument is not what was expected.
     """
+    if scenarios is None:
+        cells = load_experiment(shipped_experiments()[PUBLISHED]).cells[None]
+        scenarios = [cell.scenario for cell in cells]
     names = [scenarios] if isinstance(scenarios, str) else list(dict.fromkeys(scenarios))
     if not names:
         raise ValueError("scenarios: got none, expected at least one")
@@ -177,8 +171,15 @@ class _Game:
         found |= self.briefing.record()
         return found | ({"seats": dict(self.seats)} if self.seats else {})
 
-    def sample(self, episode: Episode, name: str | int, rooms: Sequence[Mapping[str, int]]) -> Sample:
-        """The sample of these rooms, with what is known of it before."""
+    def sample(
+        self,
+        episode: Episode,
+        name: str | int,
+        rooms: Sequence[Mapping[str, int]],
+        endings: Mapping[str, str],
+        probes: Sequence[str],
+    ) -> Sample:
+        """The sample of these rooms, with what is known of it before, and what the scorer has to know."""
         text = episode.reset(**rooms[0])
         loaded, member = self.played.loaded, episode.member
         of_suite: Sequence[str] = ()
@@ -198,6 +199,8 @@ class _Game:
                 "skills": list(loaded.scenario.skills or of_suite),
                 "cast": [entity.key for entity in loaded.checked.entities if entity.role != "object"],
                 "seat": episode.seat,
+                "endings": dict(endings),
+                "probes": list(probes),
             },
         )
 
@@ -235,18 +238,20 @@ def _task(
         raise ValueError(f"probes: got {prompting.probes!r}, expected one of {', '.join(get_args(Probing))}")
     left_out((), prompting.history)  # a limit that is none is told before anything is played
     rooms = [{"test_episode": n} if seed is None else {"seed": seed + n} for n in range(episodes)]
+    probes = list(dict.fromkeys(probe for game in games for probe in game.probes()))
     samples = []
     for game in games:
+        endings = game.endings()
         with closing(game.episode()) as episode:
             for number in range(0, episodes, trials):
                 called = number if len(games) == 1 else f"{game.scenario} {number}"
-                samples.append(game.sample(episode, called, rooms[number : number + trials]))
+                of_sample = rooms[number : number + trials]
+                samples.append(game.sample(episode, called, of_sample, endings, probes))
     by_name = {game.scenario: game for game in games}
-    probes = list(dict.fromkeys(probe for game in games for probe in game.probes()))
     return Task(
         dataset=MemoryDataset(samples, name=name),
         solver=player(lambda scenario: by_name[scenario].episode(), prompting),
-        scorer=outcome(lambda scenario: by_name[scenario].endings(), probes, trials),
+        scorer=outcome(),
         version=TextView.version,
         metadata=about,
     )
@@ -292,24 +297,18 @@ def by_skill() -> Metric:
         "probe *": [grouped(mean(), "scenario", all=False)],
     }
 )
-def outcome(
-    endings: Callable[[str], Mapping[str, str]], probes: Sequence[str] = (), trials: int = 1
-) -> Scorer:
+def outcome() -> Scorer:
     """How the episodes of a sample went: success, return and steps, and the shares of replies without an action.
 
     Such replies count as `invalid_rate`, or as `stopped_rate` where the server ended them. `trial N` is the success of
     one of several episodes. `probe NAME` is the share of right answers, and `chance NAME` that of guessing. The answer
-    is how the episodes ended, in the words of the scenario's file.
-
-    Args:
-        endings: gives those of a scenario, by the names of its outcomes.
-        probes: the names of those that are asked.
-        trials: how many episodes a sample has.
+    is how the episodes ended, in the words of the scenario's file. All of it is in a log, which can be scored again.
     """
 
     async def score(state: TaskState, target: Target) -> Score:
         played: list[dict[str, Any]] = state.store.get(EPISODES) or []
         asked: list[dict[str, Any]] = state.store.get(PROBES) or []
+        trials = len(state.metadata["rooms"])
         replies = max(sum(one["replies"] for one in played), 1)
         value: dict[str, float] = {
             "success": sum(one["success"] for one in played) / trials,
@@ -321,12 +320,12 @@ def outcome(
         if trials > 1:
             successes = [*(float(one["success"]) for one in played), *[0.0] * trials][:trials]
             value |= {f"trial {number}": success for number, success in enumerate(successes, 1)}
-        for probe in probes:
+        for probe in state.metadata["probes"]:
             about = [one for one in asked if one["probe"] == probe]
             for name, key in (("probe", "right"), ("chance", "chance")):
                 # Inspect leaves out what is not a number: this sample says nothing of the probe.
                 value[f"{name} {probe}"] = sum(one[key] for one in about) / len(about) if about else nan
-        words = endings(state.metadata["scenario"])
+        words = state.metadata["endings"]
         answer = "; ".join(words.get(one["ending"], "stopped") for one in played)
         return Score(value=value, answer=answer, metadata={"episodes": played, "probes": asked})
 

@@ -125,7 +125,7 @@ class SettingsMismatchError(ValueError):
 
 
 def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Path]:
-    """Where the transcript of each test episode goes; the folder is made.
+    """Where the transcript of each test episode goes; the folder is made. While it holds none, settings may change.
 
     Args:
         folder: of the episodes of one scenario.
@@ -138,7 +138,7 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / _SETTINGS
     content = {"format": FORMAT, "text": TextView.version, **settings}
-    if path.exists():
+    if path.exists() and has_transcripts(folder):
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
         except ValueError:
@@ -152,6 +152,11 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
     else:
         write_json(path, content)
     return lambda number: _transcript(folder, number)
+
+
+def has_transcripts(folder: Path) -> bool:
+    """Whether a folder holds replies of a model, on any seat."""
+    return any(folder.rglob("episode-*.jsonl"))
 
 
 def _transcript(folder: Path, number: int) -> Path:

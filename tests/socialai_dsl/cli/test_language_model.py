@@ -659,6 +659,7 @@ def test_a_time_out_is_a_time(time: str, capsys: Capture) -> None:
         ((404, {}, b'{"error": {"message": "no such model: stub"}}'), "status 404: no such model: stub"),
         ((200, {}, b"<html>Welcome</html>"), "the answer is no completion: <html>Welcome</html>"),
         ((400, {}, b"\x1b[2Junknown field tools\n" * 100), "status 400: \\x1b[2Junknown field tools"),
+        ((308, {"Location": "https://other/v1"}, b""), "status 308, moved to https://other/v1: nothing"),
     ],
 )
 def test_endpoints_that_are_none_are_told_of_at_once(
@@ -670,6 +671,22 @@ def test_endpoints_that_are_none_are_told_of_at_once(
     assert said in error
     assert error.count("\n") == 1
     assert len(stub.requests) <= 2 * 4
+
+
+def test_a_folder_in_which_nothing_was_played_takes_other_settings(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever mistypes an address or a model corrects it, and need not clean up; `none` as a key is no secret."""
+    options, game = ["--seat", "jill=llm:other"], "together/help_together"
+    monkeypatch.setenv("OPENAI_API_KEY", "on")
+    assert evaluate("http://127.0.0.1:1/v1", tmp_path, *options, on=game, episodes=1) == 2
+    error = capsys.readouterr().err
+    assert "no connection" in error
+    assert "kept" not in error
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path, *options, on=game, episodes=1) == 0
+        assert evaluate(f"{stub.url}/v2", tmp_path, *options, on=game, episodes=1) == 2
+    assert "played with another address" in capsys.readouterr().err
 
 
 def test_progress_tells_of_costs(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,10 +15,12 @@ from tests.socialai_dsl.llm.endpoint import Stub, endpoint
 pytest.importorskip("inspect_ai", reason="Inspect AI needs the extra inspect")
 
 from inspect_ai import eval as evaluate
-from inspect_ai import eval_retry, eval_set
+from inspect_ai import eval_retry, eval_set, score
 from inspect_ai.log import bundle_log_dir
 from inspect_ai.model import ChatMessageAssistant, GenerateConfig, ModelOutput, ModelUsage, get_model
 from inspect_ai.tool import ToolCall
+
+from socialai_dsl.llm.inspect_task import outcome
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries
 
@@ -110,6 +112,14 @@ def test_the_task_of_the_entry_point_scores_what_the_script_reaches() -> None:
         "seat": "agent",
     }
     assert log.samples[5].metadata["skills"] == ["intertwined_multimodality", "inferring_intent"]
+
+
+def test_a_log_can_be_scored_again_without_a_model() -> None:
+    log = run(lambda _: "Act: left", scenario="novel/sally_anne", episodes=2, trials=2)
+    again = score(log, outcome(), action="overwrite", display="none")
+    assert metrics(again) == metrics(log)
+    assert [sample.scores["outcome"].answer for sample in again.samples] == ["out of time; out of time"]
+    assert log.eval.scorers[0].options == {}, "nothing but the log is needed"
 
 
 def test_a_turn_is_an_event_with_action_reward_and_what_was_wrong() -> None:
