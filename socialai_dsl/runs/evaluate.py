@@ -182,7 +182,7 @@ def _evaluated(
         return play()
     place = out / scenario_folder_name(scenario)
     before = rooms_of(place)
-    if before.name != rooms.name and (place / TRANSCRIPTS).is_dir():
+    if before.name != rooms.name and any((place / TRANSCRIPTS).rglob("*.jsonl")):
         raise OptionError(
             "rooms", f"got {rooms.name}, but {place} holds episodes of {before.name}; choose another folder"
         )
