@@ -1,20 +1,21 @@
 """The progress of an experiment's runs: a line for each worker on a terminal, plain lines elsewhere."""
 
+from __future__ import annotations
+
 import time
 from collections import Counter
 from collections.abc import Sequence
+from importlib.util import find_spec
 from types import TracebackType
-from typing import IO, Final, Self
-
-from rich.console import Console, Group
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
+from typing import IO, TYPE_CHECKING, Final, Self
 
 from socialai_dsl.cli.experiment_tables import clock
 from socialai_dsl.experiments.figures import at_work, seconds_left
 from socialai_dsl.experiments.folder import PlannedRun
+
+if TYPE_CHECKING:
+    from rich.console import Group
+    from rich.live import Live
 
 _SECONDS_BETWEEN_LINES: Final = 30.0
 _SECONDS_BETWEEN_LOOKS: Final = 2.0
@@ -43,8 +44,10 @@ class RunsProgress:
         self._wrote = time.monotonic()
         self._estimate = ""
         self._live: Live | None = None
-        if stream.isatty():
-            self._live = Live(console=Console(file=stream), refresh_per_second=2)
+        if stream.isatty() and find_spec("rich") is not None:
+            from rich import console, live
+
+            self._live = live.Live(console=console.Console(file=stream), refresh_per_second=2)
 
     def __enter__(self) -> Self:
         if self._live is not None:
@@ -67,7 +70,7 @@ class RunsProgress:
         line += f"  success {_success(run)}" if outcome == "done" else ""
         line += f": {message}" if message else ""
         if self._live is not None:
-            self._live.console.print(Text(line))
+            self._live.console.print(line, markup=False, highlight=False)
         else:
             print(line, file=self._stream, flush=True)
 
@@ -87,6 +90,11 @@ class RunsProgress:
 
     def _picture(self, height: int) -> Group:
         """A line for each run at work, the last failures, which stay in sight, and the sum, on a screen so high."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
         working = at_work(self._left.values())
         failures = [Text(line, style="red", overflow="ellipsis", no_wrap=True) for line in self._failures]
         table = Table.grid(padding=(0, 2))

@@ -9,9 +9,10 @@ from typing import Any
 
 from socialai_dsl.cli.arguments import refuse
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import status_text
 from socialai_dsl.cli.terminal import json_text
-from socialai_dsl.episodes.players import require_trainer
+from socialai_dsl.episodes.players import Player, require_trainer
 from socialai_dsl.experiments.driver import drive, stopped_by_signals
 from socialai_dsl.experiments.engines import Engine
 from socialai_dsl.experiments.engines.choice import engine_named
@@ -23,8 +24,9 @@ from socialai_dsl.runs.folder import only_writer
 
 def run(arguments: argparse.Namespace) -> Exit:
     """Make the folder, or go on in it, and do the runs that are left."""
-    require_trainer("rich")
     document, folder = requested(arguments.file, arguments.profile, arguments.out)
+    if any(Player(condition["agent"]).is_trained for condition in document["conditions"]):
+        require_trainer("matplotlib", "tensorboard")
     if arguments.engine != "ray":
         refuse(arguments, ("address",), "only the engine `ray` has one")
     if arguments.engine != "slurm":
@@ -46,8 +48,6 @@ def work_on(
     Raises:
         KeyboardInterrupt: it was interrupted; all runs are left so that the same command goes on with them.
     """
-    from socialai_dsl.cli.experiment_progress import RunsProgress  # it loads Rich
-
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if as_json else sys.stdout
     with (

@@ -1,15 +1,18 @@
 """The progress of a run: a live bar on a terminal, plain lines elsewhere."""
 
-import time
-from types import TracebackType
-from typing import IO, Self
+from __future__ import annotations
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+import time
+from importlib.util import find_spec
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Self
 
 from socialai_dsl.diagnostics import counted
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.runs import train
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 _SECONDS_BETWEEN_LINES = 5.0
 _SECONDS_BETWEEN_SENTENCES = 15.0
@@ -61,7 +64,10 @@ class RunProgress:
         size, folder = _size(progress.program), progress.run.folder
         name = self._scenario or progress.run.config.scenario
         print(f"{name}: {size}; writing to {folder}", file=self._stream, flush=True)
-        if progress.total and self._stream.isatty():
+        if progress.total and self._stream.isatty() and find_spec("rich") is not None:
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
             self._bar = Progress(
                 TextColumn("training"),
                 BarColumn(bar_width=28),

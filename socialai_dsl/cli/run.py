@@ -49,9 +49,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def _run(arguments: argparse.Namespace) -> Run:
-    from socialai_dsl.episodes.players import require_trainer
-
-    require_trainer("rich")
     from socialai_dsl.cli.progress import RunProgress
     from socialai_dsl.runs.train import resume, train
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any, Final
@@ -135,17 +136,24 @@ def resolved_config(given: Mapping[str, Any]) -> RunConfig:
 # -- values that are not given ------------------------------------------------------------------------------------
 
 
+def _has_cuda() -> bool:
+    """Whether there is a graphics card; without PyTorch nobody plays who could use it."""
+    if find_spec("torch") is None:
+        return False
+    import torch
+
+    return torch.cuda.is_available()
+
+
 def resolved_device(device: str) -> str:
     """`auto` is a graphics card where there is one.
 
     Raises:
         OptionError: `cuda` was asked for and is not there, or something else was.
     """
-    import torch
-
     if device not in ("auto", "cpu", "cuda"):
         raise OptionError("device", f"got {device!r}, expected auto, cpu or cuda")
-    available = torch.cuda.is_available()
+    available = _has_cuda()
     if device == "cuda" and not available:
         raise OptionError("device", "got cuda, and PyTorch finds no CUDA device on this machine")
     return "cuda" if device == "cuda" or (device == "auto" and available) else "cpu"

@@ -141,10 +141,13 @@ def train(
         KeyboardInterrupt: it was interrupted; the message says how to go on.
         OSError: a file cannot be written.
     """
-    require_trainer("matplotlib", "tensorboard")
     spec = str(scenario)
     asked = str(options.get("agent") or LEARNS)
     agent = LEARNS if asked == LEARNS else named_agent(asked, spec)
+    if agent == LEARNS:
+        require_trainer("matplotlib", "tensorboard")
+    elif Player(agent).is_trained:
+        require_trainer()
     loaded = load(spec)
     program = compiled(loaded)
     config = _with_partners(new_config(spec, {**options, "agent": agent}, loaded), program)

@@ -25,14 +25,14 @@ conditions: [{name: chance, scenario: cointhief, agent: random}]
 LACKING = {
     "play talkitout": "play",
     "evaluate human --on talkitout": "play",
-    "run cointhief --agent random": "train",
     "run cointhief --frames 100": "train",
     "evaluate shipped:cointhief --on cointhief": "train",
     "crossplay shipped:help oracle --on together/help_together": "train",
     "words shipped:help --on together/help_together": "train",
     "trace cointhief --agent shipped": "train",
     "export shipped:cointhief --out exported": "train",
-    "experiment run tiny.yaml": "train",
+    "run cointhief --agent shipped": "train",
+    "experiment run trained.yaml": "train",
     "evaluate llm:some --on cointhief": "llm",
     "report runs/x": "report",
     "check cointhief --pictures pictures --rooms 2": "report",
@@ -56,6 +56,8 @@ WORKING = [
     "evaluate oracle --on cointhief --episodes 2",
     "crossplay oracle random --on together/help_together --episodes 2",
     "experiment plan tiny.yaml",
+    "run cointhief --agent random --eval-episodes 2",
+    "run cointhief --agent oracle --eval-episodes 2",
 ]
 HIDDEN = f"import sys; sys.modules.update(dict.fromkeys({OPTIONAL!r}))\n"
 COMMANDS = """
@@ -84,6 +86,7 @@ def ended(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[int, str,
     """What came of all commands, in one process: exit code, standard output, standard error."""
     folder = tmp_path_factory.mktemp("bare")
     (folder / "tiny.yaml").write_text(CHANCE, encoding="utf-8")
+    (folder / "trained.yaml").write_text(CHANCE.replace("agent: random", "frames: 512"), encoding="utf-8")
     shutil.copytree(ROOT / "experiments" / "studies", folder / "studies")
     process = bare(folder, COMMANDS, json.dumps([*LACKING, *WORKING]))
     assert process.returncode == 0, process.stderr
