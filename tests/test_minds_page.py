@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from socialai_dsl.experiments.document import document_of
 from socialai_dsl.frontend import load_experiment
 from tests.socialai_dsl.reporting.page_reader import Page
 
@@ -89,6 +90,20 @@ def test_a_report_is_of_its_experiment(name: str, profile: str | None) -> None:
         done = {row["condition"]: row["scenario"] for row in csv.DictReader(file) if row["agent"] != "person"}
     assert done == planned
     assert len(set(planned.values())) == {"minds": 10, "every_mind": 3}[name]
+
+
+def test_the_small_model_goes_on_where_it_stopped() -> None:
+    """In all ten scenarios it has the settings of the two that it has played, so these are not played again."""
+    with open(DOCS / "results" / "minds" / "runs.csv", newline="", encoding="utf-8") as file:
+        played = {
+            row["condition"]: row["id"] for row in csv.DictReader(file) if row["column"] == "SmolLM2-135M"
+        }
+    loaded = load_experiment(Path(__file__).parents[1] / "experiments" / "minds.yaml")
+    planned = {run["condition"]: run["id"] for run in document_of(loaded, "laptop_all")["runs"]}
+    assert len([name for name in planned if name.endswith("SmolLM2-135M")]) == 10
+    settings = [cell.model for cell in loaded.cells["laptop_all"] if cell.name in played]
+    assert settings == [cell.model for cell in loaded.cells["laptop"] if cell.name in played]
+    assert {name: planned[name] for name in played} == played
 
 
 def test_the_people_of_the_example_are_simulated_and_marked_so() -> None:
