@@ -122,7 +122,7 @@ def let_models_play(
     except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
     except EndpointError as error:
-        kept = f". Replies so far are kept in {folder}; the same command goes on"
+        kept = f". Replies so far are kept in {folder} and not asked for again"
         raise UsageError(f"{error}{kept if has_transcripts(folder) else ''}") from None
     if len(played) < episodes:
         raise RunFailed(

@@ -65,6 +65,9 @@ _CHEATS: Final = (
 )
 
 
+_MOST_REASONS: Final = 3
+
+
 @dataclass
 class Course:
     """What a simulated participant met.
@@ -74,6 +77,7 @@ class Course:
         acts: that it chose. waits: seconds from each act to the next picture, of the clock on the wall.
         screens: kinds of screens that it saw. left: whether it left by itself.
         by_chance: acts of an agent that it chose by chance, as the agent does not play there, or failed.
+        failures: why a language model failed, and how often.
     """
 
     kind: str
@@ -84,6 +88,7 @@ class Course:
     screens: Counter[str] = field(default_factory=Counter)
     left: bool = False
     by_chance: int = 0
+    failures: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,7 @@ class Rehearsal:
             said += f", {chance} of {acts} acts by chance" if chance else ""
             wide = max(map(len, (*KINDS, *kinds)))
             yield f"  {kind:<{wide}} {sum(one.finished for one in own)} of {len(own)} finished{said}"
+            yield from _reasons(sum((one.failures for one in own), Counter()))
         people, steps = self.data.tables["participants"], self.data.tables["steps"]
         groups = Counter(row["group"] for row in people if row["group"] != "")
         yield "groups: " + ", ".join(f"{group}: {count}" for group, count in sorted(groups.items()))
@@ -121,9 +127,10 @@ class Rehearsal:
             played = {(row["game"], row["trial"]) for row in rows}
             stood = len(played & self._with_stand_ins(persons.get(block, ())))
             more = f", {stood} with a stand-in" if stood else ""
-            missed = sum(bool(r["missed"]) and (r["game"], r["trial"]) in played for r in steps)
-            more += f", {missed} steps that a language model missed" if missed else ""
+            missed = Counter(r["missed"] for r in steps if r["missed"] and (r["game"], r["trial"]) in played)
+            more += f", {missed.total()} steps that a language model missed" if missed else ""
             yield f"  {block}: {len(rows)} episodes, {won / len(rows):.0%} successful{more}"
+            yield from _reasons(missed)
         excluded = Counter(row["excluded"] for row in people if row["excluded"])
         if excluded:
             yield "excluded: " + ", ".join(f"{count} {reason}" for reason, count in excluded.items())
@@ -142,6 +149,11 @@ class Rehearsal:
         """Games and trials in which somebody else than a person chose a step on a seat that is a person's."""
         steps = self.data.tables["steps"]
         return {(r["game"], r["trial"]) for r in steps if r["seat"] in persons and r["by"] != PERSON}
+
+
+def _reasons(missed: Counter[str]) -> Iterable[str]:
+    """Why language models did not act, the most frequent reasons first."""
+    return (f"    {count} times: {reason}" for reason, count in missed.most_common(_MOST_REASONS))
 
 
 def rehearse(
@@ -455,5 +467,6 @@ class Simulated:
 
         try:
             return (await self._model.act())[1]
-        except ModelFailed:
+        except ModelFailed as failed:
+            self._course.failures[str(failed)] += 1
             return None

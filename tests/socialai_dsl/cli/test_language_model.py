@@ -482,7 +482,8 @@ def test_a_failure_loses_nothing_and_the_same_command_goes_on(tmp_path: Path, ca
     assert error.count("\n") == 1
     assert "model 'stub' at http://127.0.0.1:" in error
     assert "status 401" in error
-    assert "the same command goes on" in error
+    assert "are kept in" in error
+    assert "not asked for again" in error
     assert not (tmp_path / "talkitout" / "result.json").exists()
     # A line that was being written when the power went.
     torn = tmp_path / "talkitout/transcripts/episode-001.jsonl"

@@ -99,6 +99,9 @@ def test_a_language_model_takes_part_and_chance_plays_where_it_fails(answer: Any
     else:
         assert course.by_chance == course.acts
         assert len(moves) > 1
+        (reason,) = [line for line in found.lines(loaded) if "status 401" in line]
+        assert reason.startswith(f"    {course.acts} times: model 'stub' at {stub.url}")
+        assert course.failures.total() == course.acts
 
 
 @pytest.mark.parametrize(
