@@ -138,9 +138,13 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         },
         set(),
     ),
+    "study.exported": (
+        TEXT_SIDE | {"atomic", "errors", "traces", "study.columns", "study.replay"},
+        set(),
+    ),
     "study": (
         TEXT_SIDE
-        | {"study.columns", "study.log", "study.progress", "study.arena", "study.replay"}
+        | {"study.columns", "study.log", "study.progress", "study.arena", "study.replay", "study.exported"}
         | {
             "errors",
             "atomic",
@@ -174,7 +178,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE
         | {"errors", "atomic", "program_suite", "compilation", "envs", "episodes", "traces", "evaluation"}
         | {"baselines", "experiments", "model_options", "reporting"}
-        | {"runs.folder", "runs.options", "runs.versions", "study.log", "study.replay"},
+        | {"runs.folder", "runs.options", "runs.versions", "study.log", "study.replay", "study.exported"},
         {"pydantic", "yaml", "trainer"},
     ),
     "experiments": (

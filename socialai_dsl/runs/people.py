@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
-from socialai_dsl.frontend import LoadedStudy, load_study
+from socialai_dsl.frontend import load_study
+from socialai_dsl.study.exported import is_exported, read_exported
 from socialai_dsl.study.log import FILE
 from socialai_dsl.study.replay import PlayedBlock, Row, StudyData, study_data, study_of
 
@@ -24,21 +25,20 @@ _A_PERSON: Final = "a person"
 
 
 def is_study(folder: Path) -> bool:
-    """Whether a folder holds the log of a study."""
-    return (folder / FILE).is_file()
+    """Whether a folder holds the log of a study, or tables that were made from one."""
+    return (folder / FILE).is_file() or is_exported(folder)
 
 
 @dataclass(frozen=True)
 class _Study:
-    """A study whose log was played again.
+    """A study whose log was played again, now or when its tables were written.
 
     Attributes:
-        name: by which the report tells it from others. folder: of its log. loaded: its file. data: its tables.
+        name: by which the report tells it from others. folder: of its log or its tables. data: its tables.
     """
 
     name: str
     folder: Path
-    loaded: LoadedStudy
     data: StudyData
 
     def counted(self) -> dict[str, Row]:
@@ -72,8 +72,18 @@ def _read(folders: Sequence[Path]) -> tuple[list[_Study], list[str]]:
     remarks = []
     for folder in dict.fromkeys(path.resolve() for path in folders):
         try:
-            loaded = load_study(study_of(folder))
-            found.append(_Study(loaded.study.study, folder, loaded, study_data(loaded, folder)))
+            data = (
+                study_data(load_study(study_of(folder)), folder)
+                if (folder / FILE).is_file()
+                else read_exported(folder)
+            )
+            same = next(
+                (one for one in found if (one.name, one.data.begun) == (data.study, data.begun)), None
+            )
+            if same is not None:
+                remarks.append(f"study in {folder.name} left out: {same.folder.name} has the same people")
+                continue
+            found.append(_Study(data.study, folder, data))
         except ScenarioError as error:
             first = error.diagnostics[0]
             remarks.append(
@@ -304,12 +314,6 @@ def _questions(study: _Study, counted: Mapping[str, Any]) -> list[QuestionRecord
     for row in study.data.tables["answers"]:
         if row["participant"] in counted:
             given[row["question"]][row["participant"]] = row["answer"]
-    asked = [
-        (block.name, question)
-        for block, written in zip(study.data.blocks, study.loaded.study.blocks, strict=True)
-        for question in written.questions
-    ]
-    asked += [("", question) for question in study.loaded.study.questions]
     return [
         QuestionRecord(
             block=block,
@@ -322,5 +326,5 @@ def _questions(study: _Study, counted: Mapping[str, Any]) -> list[QuestionRecord
             ends=tuple(question.ends or ()),
             answers=given[question.id],
         )
-        for block, question in asked
+        for block, question in study.data.questions
     ]

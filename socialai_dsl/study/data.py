@@ -11,6 +11,7 @@ from socialai_dsl.atomic import write_json, write_text
 from socialai_dsl.checking.studies import LoadedStudy
 from socialai_dsl.errors import UsageError
 from socialai_dsl.study.columns import COLUMNS
+from socialai_dsl.study.exported import TABLES, table_file, write_about
 from socialai_dsl.study.replay import StudyData
 
 _REHEARSAL: Final = "Simulated: a rehearsal, in which no person took part."
@@ -32,25 +33,25 @@ def write_data(data: StudyData, loaded: LoadedStudy, out: Path, parquet: bool = 
         OSError: they cannot be written.
         UsageError: pyarrow is not installed.
     """
-    folder, name = out / "data", loaded.study.study.replace("_", "")
+    folder = out / TABLES
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for table, rows in data.tables.items():
-        file = folder / f"study-{name}_table-{table}_data.csv"
+        file = folder / table_file(data.study, table)
         with open(file, "w", encoding="utf-8", newline="") as stream:
             writer = csv.DictWriter(stream, list(COLUMNS[table]))
             writer.writeheader()
             writer.writerows(rows)
         written.append(file)
-    written += _parquet(data, folder, name) if parquet else []
+    written += _parquet(data, folder) if parquet else []
     described = out / "dataset_description.json"
     write_json(described, _description(loaded, data.simulated))
     codebook = out / "codebook.md"
     write_text(codebook, _codebook(loaded, data.simulated))
-    return [*written, described, codebook]
+    return [*written, described, codebook, write_about(data, out)]
 
 
-def _parquet(data: StudyData, folder: Path, name: str) -> list[Path]:
+def _parquet(data: StudyData, folder: Path) -> list[Path]:
     try:
         import pyarrow as pa
         from pyarrow import parquet as pq
@@ -65,7 +66,7 @@ def _parquet(data: StudyData, folder: Path, name: str) -> list[Path]:
             columns[column] = pa.array(
                 values if len(kinds) <= 1 else [None if v is None else str(v) for v in values]
             )
-        file = folder / f"study-{name}_table-{table}_data.parquet"
+        file = (folder / table_file(data.study, table)).with_suffix(".parquet")
         pq.write_table(pa.table(columns), file)
         written.append(file)
     return written

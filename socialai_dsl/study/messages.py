@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 LARGEST: Final = 65_536
 """Bytes of a message that is read at all."""
 
+
+def _yes(value: bool) -> bool:
+    if not value:
+        raise ValueError("got false, expected true")
+    return value
+
+
 _Screen = Annotated[str, Field(max_length=80)]
 _Milliseconds = Annotated[float, Field(ge=0, le=1e10)]
+_Yes = Annotated[bool, AfterValidator(_yes)]
+"""`true`, and not what only counts as true, such as 1."""
 
 
 class _Message(BaseModel):
@@ -78,7 +87,7 @@ class Join(_Message):
     do: Literal["join"]
     id: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     code: Annotated[str, Field(max_length=80)] | None = None
-    consented: Literal[True]
+    consented: _Yes
     simulated: bool = False
 
 

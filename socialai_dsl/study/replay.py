@@ -19,7 +19,7 @@ from socialai_dsl.episodes.asking import Asking
 from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.schema.study import PERSON
+from socialai_dsl.schema.study import PERSON, Question
 from socialai_dsl.study.arena import Arena, Episode
 from socialai_dsl.study.columns import COLUMNS
 from socialai_dsl.study.log import FILE, FORMAT, Event, read_log
@@ -79,6 +79,8 @@ class StudyData:
         tables: name -> rows, in the columns of `COLUMNS`.
         replayed: how many episodes were played again. unended: how many more had not ended.
         simulated: whether simulated participants took part. blocks: in the order of the file.
+        study: its name. begun: the time of the first event of its log, UTC.
+        questions: in the order of the file, each with the name of its block; those at the end with none.
     """
 
     tables: Mapping[str, Sequence[Row]]
@@ -86,6 +88,9 @@ class StudyData:
     unended: int
     simulated: bool = False
     blocks: Sequence[PlayedBlock] = ()
+    study: str = ""
+    begun: str = ""
+    questions: Sequence[tuple[str, Question]] = ()
 
 
 def study_data(loaded: LoadedStudy, folder: Path) -> StudyData:
@@ -117,7 +122,7 @@ class _Tables:
         self._rows: dict[str, list[Row]] = {name: [] for name in COLUMNS}
         self._going: dict[str, _Going] = {}
         self._of: dict[str, _Of] = {}
-        self._server, self._replayed, self._simulated = 0, 0, False
+        self._server, self._replayed, self._simulated, self._begun = 0, 0, False, ""
 
     def made(self) -> StudyData:
         for number, event in enumerate(read_log(self._file), start=1):
@@ -135,7 +140,13 @@ class _Tables:
             name: [self._whole(row, columns) for row in self._rows[name]] for name, columns in COLUMNS.items()
         }
         blocks = [self._block(number) for number in range(len(self._loaded.study.blocks))]
-        return StudyData(tables, self._replayed, len(self._going), self._simulated, blocks)
+        study = self._loaded.study
+        asked = [
+            (block_name(self._loaded, n), q) for n, block in enumerate(study.blocks) for q in block.questions
+        ]
+        asked += [("", question) for question in study.questions]
+        counts = self._replayed, len(self._going)
+        return StudyData(tables, *counts, self._simulated, blocks, study.study, self._begun, asked)
 
     def _whole(self, row: Row, columns: Iterable[str]) -> Row:
         """A row in the order of the columns, with what every table has."""
@@ -170,7 +181,7 @@ class _Tables:
                         f"{self._file}: is of another study, or of other versions of its scenarios; expected "
                         f"{own['study']!r} with the scenarios as they are now"
                     )
-                self._simulated = bool(event.get("simulated"))
+                self._simulated, self._begun = bool(event.get("simulated")), event["time"]
             case "server":
                 self._server += 1
             case "joined":

@@ -6,9 +6,11 @@ import asyncio
 import contextlib
 import csv
 import hmac
+import io
 import json
 import logging
 import os
+import re
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable, Collection
@@ -23,6 +25,7 @@ from starlette.websockets import WebSocket
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.checking.studies import PICTURES, LoadedStudy
+from socialai_dsl.errors import UsageError
 from socialai_dsl.study.live import Live
 from socialai_dsl.study.messages import joining
 from socialai_dsl.study.words import words_of
@@ -33,6 +36,7 @@ KEY: Final = "key"
 RECRUITED: Final = "recruited.csv"
 UNKNOWN: Final = 4404
 REFUSED: Final = 4403
+_KEY_BYTES: Final = 32
 _TICK: Final = 0.25
 _MOST_JOINING: Final = 200
 """How many may join at once; after that as many in a second."""
@@ -175,11 +179,19 @@ class StudyServer:
             return code
 
     def _remember(self, given: str, person: str) -> None:
-        """Keep a platform's id, apart from the data."""
-        with open(self._folder / RECRUITED, "a", encoding="utf-8", newline="", opener=_private) as file:
-            csv.writer(file).writerow((person, given))
-            file.flush()
-            os.fsync(file.fileno())
+        """Keep a platform's id, apart from the data. Raises OSError where that cannot be stored."""
+        row = io.StringIO()
+        csv.writer(row).writerow((person, given))
+        with open(self._folder / RECRUITED, "ab", opener=_private) as file:
+            whole = file.tell()
+            try:
+                file.write(row.getvalue().encode())
+                file.flush()
+                os.fsync(file.fileno())
+            except OSError:
+                with contextlib.suppress(OSError):
+                    file.truncate(whole)  # a part of a row would spoil the next one
+                raise
         self._recruited[given] = person
 
     async def _page(self, request: Request) -> Response:
@@ -320,23 +332,35 @@ def _private(path: str, flags: int) -> int:
 
 
 def _key(file: Path) -> bytes:
-    """The secret that links are made from, the same as long as the folder is there."""
-    try:
-        return bytes.fromhex(file.read_text(encoding="ascii").strip())
-    except FileNotFoundError:
-        made = secrets.token_bytes(32)
-        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        os.close(descriptor)
-        write_text(file, made.hex() + "\n")  # which keeps these permissions
-        return made
+    """The secret that links are made from, the same as long as the folder is there.
+
+    Raises:
+        OSError: it cannot be read or written.
+        UsageError: it is damaged.
+    """
+    with contextlib.suppress(FileNotFoundError):
+        written = file.read_text(encoding="ascii").strip()
+        if re.fullmatch(rf"[0-9a-f]{{{2 * _KEY_BYTES}}}", written):
+            return bytes.fromhex(written)
+        if written:
+            raise UsageError(f"{file}: got something else, expected the {2 * _KEY_BYTES} digits of a secret")
+    # There is none, or its disk was full when it was to be written, before any link was made.
+    made = secrets.token_bytes(_KEY_BYTES)
+    os.close(os.open(file, os.O_WRONLY | os.O_CREAT, 0o600))
+    write_text(file, made.hex() + "\n")  # which keeps these permissions
+    return made
 
 
 def _recruited(file: Path) -> dict[str, str]:
-    """Platforms' ids -> participants."""
+    """Platforms' ids -> participants. A row that was cut off, whose participant got no link, is taken out."""
     if not file.exists():
         return {}
-    with open(file, encoding="utf-8", newline="") as stream:
-        return {row[1]: row[0] for row in csv.reader(stream) if len(row) == 2}
+    content = file.read_bytes()
+    whole = content.rfind(b"\n") + 1
+    if whole < len(content):
+        os.truncate(file, whole)
+    rows = csv.reader(io.StringIO(content[:whole].decode(), newline=""))
+    return {row[1]: row[0] for row in rows if len(row) == 2}
 
 
 def _is_failure(record: logging.LogRecord) -> bool:

@@ -48,7 +48,7 @@ def page(
         title: of the page.
         without: what is said where scripts are off.
         language: of the page, as a tag.
-        older: the name of a script for browsers that know no modules, if there is one.
+        older: the name of a script for browsers of any age, which says what the page needs, if there is one.
         **data: what the script finds in `document.body.dataset`.
     """
     nonce = secrets.token_urlsafe(16)
@@ -61,7 +61,7 @@ def page(
         without=escape(without),
         language=escape(language),
         data=words,
-        older=f'\n<script nomodule src="/static/{older}"></script>' if older else "",
+        older=f'\n<script src="/static/{older}"></script>' if older else "",
     )
     return guarded(HTMLResponse(filled), nonce)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,6 +67,56 @@ def test_the_page_speaks_the_language_of_the_study_and_fits_a_phone(
     page.get_by_text(words["step"].format(number=1)).wait_for()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()
+
+
+OLD = {
+    "cannot read the scripts": lambda page: page.route(
+        "**/study.js", lambda route: route.fulfill(body="class { ??= }", content_type="text/javascript")
+    ),
+    "knows no sockets": lambda page: page.add_init_script("delete window.WebSocket"),
+    "lacks what the scripts use": lambda page: page.add_init_script(
+        "delete Element.prototype.replaceChildren"
+    ),
+    "cannot get the scripts": lambda page: page.route("**/screen.js", lambda route: route.abort()),
+}
+
+
+@pytest.mark.parametrize(("lacks", "language"), [*zip(OLD, ("en", "de", "fr", "en"), strict=True)])
+def test_a_browser_that_cannot_show_the_page_says_what_is_needed(
+    lacks: str, language: str, browser: Browser, link: Callable[[str], str]
+) -> None:
+    context = browser.new_context()
+    old = context.new_page()
+    OLD[lacks](old)
+    old.goto(link(language))
+    assert old.inner_text("body").strip() == words_of(language)["script"]
+    assert old.get_attribute("html", "lang") == language
+    context.close()
+
+
+def test_a_browser_without_scripts_says_so_and_one_that_can_shows_the_page(
+    browser: Browser, page: Page, link: Callable[[str], str]
+) -> None:
+    address = link("de")
+    without = browser.new_context(java_script_enabled=False)
+    other = without.new_page()
+    other.goto(address)
+    assert other.inner_text("noscript") == words_of("de")["script"]
+    without.close()
+    page.goto(address)
+    page.wait_for_selector(".study")
+    assert words_of("de")["script"] not in page.inner_text("body")
+
+
+def test_what_says_so_is_written_for_browsers_of_any_age() -> None:
+    """No word or sign that came with ECMAScript 2015 or later, which would keep it from being read at all."""
+    text = (ROOT / "socialai_dsl" / "study" / "static" / "old.js").read_text(encoding="utf-8")
+    assert (
+        re.findall(
+            r"=>|`|\?\.|\?\?|\.\.\.|\b(?:let|const|class|async|await|import|export|for\s*\(\w+ of)\b", text
+        )
+        == []
+    )
 
 
 def test_every_language_has_every_text() -> None:

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from pathlib import Path
 from statistics import fmean, median
 
@@ -376,10 +377,10 @@ def test_a_study_that_goes_on_counts_as_far_as_it_is(
 def test_two_studies_of_one_name_are_told_apart(
     place: Path, copied: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folders = [place / "asking_rehearsal", copied / "asking_rehearsal", place / "asking_rehearsal"]
-    other = copied / "elsewhere"
-    folders[1].rename(other)
-    told = remarks_of(place, [folders[0], other, folders[2]], capsys, copied / "report")
+    shutil.rmtree(copied / "asking_rehearsal")
+    other = rehearsed(copied, kinds=("random",)).rename(copied / "elsewhere")
+    live = place / "asking_rehearsal"
+    told = remarks_of(place, [live, other, live], capsys, copied / "report")
     assert "2 studies are called 'asking'; they are told apart by their folders" in told
     studies = {row["study"] for row in rows(copied / "report" / "minds.csv") if row["study"]}
     assert studies == {"asking in asking_rehearsal", "asking in elsewhere"}
@@ -410,3 +411,60 @@ def test_where_nothing_can_be_believed_there_is_no_report(
     assert main(["report", str(copied / "asking_rehearsal"), "--out", str(copied / "report")]) == 2
     assert "which is not there" in capsys.readouterr().err
     assert not (copied / "report").exists()
+
+
+# -- tables that were written before -------------------------------------------------------------------------------
+
+
+def test_tables_of_a_study_make_the_same_report_as_its_log(
+    place: Path, report: Path, data: dict[str, list[Row]], tmp_path: Path
+) -> None:
+    """Also where neither the study's file nor its log is there any more."""
+    moved = tmp_path / "elsewhere"
+    shutil.copytree(place / "data", moved)
+    out = tmp_path / "report"
+    assert main(["report", str(moved), *inputs(place)[1:], "--no-baselines", "--out", str(out)]) == 0
+    written = sorted(file.name for file in report.glob("*.csv"))
+    assert {"minds.csv", "trials.csv", "rooms.csv", "asked.csv", "answers.csv", "times.csv"} <= {*written}
+    assert written == sorted(file.name for file in out.glob("*.csv"))
+    for name in written:
+        assert (out / name).read_text(encoding="utf-8") == (report / name).read_text(encoding="utf-8"), name
+
+
+def test_the_same_people_are_not_counted_twice(
+    place: Path, data: dict[str, list[Row]], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    folders = [place / "asking_rehearsal", place / "data"]
+    assert main(["report", *map(str, folders), "--no-baselines", "--out", str(tmp_path / "report")]) == 0
+    assert "study in data left out: asking_rehearsal has the same people" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (lambda folder: folder / "data", "name the folder above"),
+        (lambda folder: (folder / "study.json").unlink(), "write it again with `socialai study data`"),
+        (lambda folder: (folder / "study.json").write_text("{}"), "study.json: is damaged"),
+        (lambda folder: next(folder.glob("data/*episodes*")).unlink(), "is not there"),
+        (lambda folder: edited(next(folder.glob("data/*episodes*"))), "was changed since it was written"),
+    ],
+)
+def test_tables_that_cannot_be_read_are_refused_with_a_cure(
+    spoil: Callable[[Path], Path | None],
+    why: str,
+    place: Path,
+    data: dict[str, list[Row]],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    shutil.copytree(place / "data", tmp_path / "spoilt")
+    named = spoil(tmp_path / "spoilt")
+    folder = named if isinstance(named, Path) else tmp_path / "spoilt"
+    assert main(["report", str(folder), "--no-baselines", "--out", str(tmp_path / "report")]) == 2
+    assert why in capsys.readouterr().err
+    (told,) = remarks_of(place, [folder], capsys, tmp_path / "report")
+    assert why in told
+
+
+def edited(table: Path) -> None:
+    table.write_text(table.read_text(encoding="utf-8").replace("False", "True"), encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hmac
 import json
 import os
 import signal
@@ -20,6 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.errors import UsageError
 from socialai_dsl.study.rehearsal import rehearse
 from socialai_dsl.study.replay import study_data
 from socialai_dsl.study.server import StudyServer
@@ -110,6 +112,48 @@ def test_who_comes_from_a_platform_gets_a_link_of_their_own_and_the_same_again(f
         assert httpx.get(f"{at}/join?PROLIFIC_PID=abc").headers["location"] == first, "after a new start, too"
     assert (out / "recruited.csv").read_text(encoding="utf-8").split() == ["p0001,abc", "p0002,other"]
     assert "abc" not in (out / "log.jsonl").read_text(), "ids are kept apart from the data"
+
+
+@pytest.mark.parametrize("left", ["", "00ff\n", "zz" * 32])
+def test_links_are_made_from_a_whole_secret_or_from_none(left: str, place: Path, tmp_path: Path) -> None:
+    """A full disk leaves an empty file, from which anybody could make links."""
+
+    async def code() -> str:
+        server = StudyServer(loaded_study(ALONE, place), tmp_path, "127.0.0.1")
+        await server.live.close()
+        return server.code("p0001")
+
+    (tmp_path / "key").touch(mode=0o600)
+    (tmp_path / "key").write_text(left, encoding="ascii")
+    if left:
+        with pytest.raises(UsageError, match="key: got"):
+            run(code)
+        assert (tmp_path / "key").read_text(encoding="ascii") == left
+        return
+    made = run(code)
+    assert made != hmac.new(b"", b"p0001", "sha256").hexdigest()[:40]
+    assert run(code) == made
+    assert stat.S_IMODE((tmp_path / "key").stat().st_mode) == 0o600
+
+
+def test_a_row_that_was_cut_off_spoils_no_other(place: Path, tmp_path: Path) -> None:
+    """As a server leaves it that was killed while it wrote down who comes."""
+
+    async def come(*ids: str) -> list[str]:
+        server = StudyServer(loaded_study(ALONE, place), tmp_path, "127.0.0.1")
+        transport = httpx.ASGITransport(server.app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
+            found = [(await client.get(f"/join?PROLIFIC_PID={one}")).headers["location"] for one in ids]
+        await server.live.close()
+        return found
+
+    (first,) = run(lambda: come('quoted"%2Cid'))
+    with open(tmp_path / "recruited.csv", "a", encoding="utf-8") as file:
+        file.write('p0002,"cut off')
+    again, other = run(lambda: come('quoted"%2Cid', "other"))
+    assert again == first
+    assert run(lambda: come("other", "cut off")) != [other, first]
+    assert run(lambda: come("other"))[0] == other
 
 
 def test_who_comes_twice_at_once_gets_one_link_and_a_look_ahead_gets_none(

@@ -934,7 +934,7 @@ var en = {
   forgotten: "The study does not know this participant any more. Load this page again to begin anew; what was stored is kept.",
   silent: "The server of the study has not answered. What was stored is kept.",
   connecting: "Connecting to the study…",
-  script: "This study needs a browser from 2023 or later, with scripts allowed. Nothing is lost: open the same address in another browser."
+  script: "This page cannot be shown here: it needs a browser from 2023 or later (Chrome, Edge, Firefox or Safari), with scripts allowed. Nothing is lost: load it again, or open the same address in another browser."
 };
 
 // web/jspsych-socialai/src/session.js
