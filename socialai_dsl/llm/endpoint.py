@@ -233,11 +233,12 @@ class Endpoint:
             return response.status_code, response.headers, content
 
     def _answer(self, found: Completion, content: bytes, messages: Sequence[Message]) -> Answer:
-        """A completion with what it took; without a count four characters are a token."""
+        """A completion with what it took; without a count four characters are a token, read or, if none was, sent."""
         prompt, completion = found.prompt_tokens, found.completion_tokens
         estimated = prompt is None or completion is None
         if prompt is None or completion is None:
-            prompt, completion = len(json.dumps(messages)) // 4, len(content) // 4
+            written = "".join((found.text, found.reasoning, *(word for call in found.calls for word in call)))
+            prompt, completion = len(json.dumps(messages)) // 4, len(written or content) // 4
         cost = found.cost
         if self.prices is not None:
             cost = (prompt * self.prices[0] + completion * self.prices[1]) / 1e6

@@ -526,6 +526,16 @@ def test_a_spent_budget_counts_every_episode_that_is_over(tmp_path: Path, capsys
     assert "2 of 3 episodes are over" in capsys.readouterr().err
 
 
+def test_without_a_count_four_characters_of_what_the_model_wrote_are_a_token(tmp_path: Path) -> None:
+    written = {"role": "assistant", "reasoning": "I wonder. " * 8, "content": "Act: done"}
+    answer = {"choices": [{"index": 0, "message": written, "finish_reason": "stop"}], "id": "long" * 500}
+    with endpoint(lambda _: (200, {}, json.dumps(answer).encode())) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    found = figures(tmp_path)["eval"]
+    assert (found["tokens_estimated"], found["completion_tokens"]) == (True, (80 + 9) // 4)
+    assert found["prompt_tokens"] == len(json.dumps(stub.requests[0]["messages"])) // 4
+
+
 def test_other_settings_need_another_folder(tmp_path: Path, capsys: Capture) -> None:
     with endpoint(lambda _: "Act: done") as stub:
         assert evaluate(stub.url, tmp_path) == 0
