@@ -165,7 +165,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 class Explainer:
-    """Plays the last step of an environment again and reads what was noted.
+    """Plays the steps of an environment again and reads what was noted in the last one.
 
     Args:
         program: what the environment plays. scenario: what it was compiled from.
@@ -187,19 +187,22 @@ class Explainer:
         self._noting = compile_noting(scenario)
         self._table = Table([_alone(self._noting.program, suite, number)], 1, all_seats=seats > 1)
         self._table.reset(0, None)
+        self._recording: Recording | None = None
+        self._steps = 0
+        self._fired = np.zeros_like(self._table.batch.counters)
 
     def explain(self, recording: Recording, reached: NDArray[np.int32] | None) -> dict[str, Any]:
         """Explain the last step of a recording, which led to these registers, int32 (R,), if they are known.
 
         See `ScenarioEnv.explain`.
         """
-        fired = self._play(recording)
+        self._play(recording)
         registers = self._table.state.registers[0]
         known = self._noting.first
         same = reached is None or np.array_equal(registers[:known], reached[:known])
         assert same, "internal: the step that was explained went another way"
         notes = _Notes(self._noting.program, self._program, registers, self._table.state.boards[0])
-        story = _Story(self._checked, self._noting.rules, self._noting.outcomes, notes, fired)
+        story = _Story(self._checked, self._noting.rules, self._noting.outcomes, notes, self._fired)
         entries = list(story.entries())
         return {
             "t": int(registers[Register.T]),
@@ -207,24 +210,30 @@ class Explainer:
             "others": [entry for entry in entries if not entry["fired"]],
         }
 
-    def _play(self, recording: Recording) -> NDArray[np.int64]:
-        """Play the recording; which counters the last step has raised."""
+    def _play(self, recording: Recording) -> None:
+        """Play what was recorded, from where it was left: a recording only grows."""
+        if recording is not self._recording:
+            self._begin(recording.start)
+            self._recording, self._steps = recording, 0
         state, batch = self._table.state, self._table.batch
-        start = recording.start
+        for step in range(self._steps, len(recording.actions)):
+            if recording.taken:
+                batch.ports.taken[:] = recording.taken[step]
+            state.registers[0, self._noting.first :] = 0
+            before = batch.counters.copy()
+            action = np.frombuffer(recording.actions[step], np.int64)
+            batch.ports.actions[:] = action.reshape(batch.ports.actions.shape)
+            batch.step(Task.STEP_ONLY)
+            self._fired = np.asarray(batch.counters - before)
+        self._steps = len(recording.actions)
+
+    def _begin(self, start: Start) -> None:
+        state = self._table.state
         state.keys[0] = self._table.own_keys(start.key)
         state.registers[:] = 0
         state.registers[0, : self._noting.first] = start.registers[: self._noting.first]
         state.boards[0] = start.board[: state.boards.shape[1]]
         state.tokens[:] = 0
-        before = batch.counters.copy()
-        for step, action in enumerate(recording.actions):
-            if recording.taken:
-                batch.ports.taken[:] = recording.taken[step]
-            state.registers[0, self._noting.first :] = 0
-            before = batch.counters.copy()
-            batch.ports.actions[:] = np.frombuffer(action, np.int64).reshape(batch.ports.actions.shape)
-            batch.step(Task.STEP_ONLY)
-        return np.asarray(batch.counters - before)
 
 
 def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program | ProgramSuite:

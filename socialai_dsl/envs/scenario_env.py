@@ -465,8 +465,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
     def explain(self) -> dict[str, Any]:
         """Which rules fired in the last step, and why the others that were asked did not.
 
-        Nothing changes. The episode is played again from its start up to this step, so this is for looking, not for
-        every step of training.
+        Nothing changes. The steps since the last call, or since the episode began, are played again, so this is for
+        looking, not for every step of training.
 
         Returns:
             `t`, `fired` and `others`, two lists in the order in which the rules were asked. An entry has `who` (a

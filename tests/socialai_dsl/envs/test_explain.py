@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.engine.batch import Batch
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs import ScenarioEnv
 from tests.tiny import Folder, Play
 
@@ -233,6 +235,27 @@ def test_after_restore_it_goes_on_from_there(tiny: Folder) -> None:
     whole.env.unwrapped.restore(middle)  # type: ignore[attr-defined]
     whole.step("forward", "Say bye")
     assert explained(whole) == expected
+
+
+def test_each_step_is_played_again_once(tiny: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However often, and after however many steps, somebody asks; and what is told does not depend on it."""
+    said = ["Say bye", "Say hello", "Say bye", "Say bye", "Say hello", "Say bye"]
+    asked: list[dict[str, Any]] = []
+    played: list[Task] = []
+    step = Batch.step
+    for every in (1, 2, 3, 6):
+        play, played[:] = tiny(GUIDE), []
+        for number, words in enumerate(said, 1):
+            play.step(None, words)
+            if number % every == 0:
+                with monkeypatch.context() as patched:
+                    patched.setattr(
+                        Batch, "step", lambda batch, task: played.append(task) or step(batch, task)
+                    )
+                    assert explained(play) == explained(play)
+        asked.append(explained(play))
+        assert len(played) == len(said)
+    assert asked == [asked[0]] * len(asked)
 
 
 def test_members_of_suites_and_acts(tiny: Folder) -> None:
