@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections import defaultdict
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,11 +14,8 @@ from markdown_it import MarkdownIt
 from socialai_dsl.checking.studies import (
     PRACTICE,
     LoadedStudy,
-    asked_by,
     block_name,
     is_model,
-    is_trained,
-    models_of,
     persons_of,
     players_of,
     stand_ins_of,
@@ -33,12 +27,12 @@ from socialai_dsl.schema.study import PERSON, Question
 from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.log import FILE, Event, Log, read_log
 from socialai_dsl.study.messages import Act, Answers, Beat, Decline, Go, Screen, parsed
+from socialai_dsl.study.players import Players
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
 from socialai_dsl.study.replay import Row, header_of, reset_of, study_file, tell_of
-from socialai_dsl.trainer.shipped import PREFIX
 
 if TYPE_CHECKING:  # it needs httpx, which is only there if language models were asked for
-    from socialai_dsl.study.models import Endpoints, Thinking
+    from socialai_dsl.study.models import Thinking
 
 MOST_LINES: Final = 200
 """How many of the last lines that were heard a page shows."""
@@ -148,9 +142,7 @@ class Live:
         self._waiting: dict[int, dict[str, float]] = {}
         self._markdown = MarkdownIt("commonmark", {"html": False, "breaks": False})
         self.progress = Progress(loaded)
-        self._policies: defaultdict[tuple[int, Seat], list[Any]] = defaultdict(list)
-        self._check_agents()
-        self._endpoints = self._asked_models()
+        self._players = Players(loaded, self.arenas)
         self._watched = {
             number
             for number, block in enumerate(self._study.blocks)
@@ -248,8 +240,7 @@ class Live:
         for running in self._running.values():
             if running.thinking is not None:
                 running.thinking.stop()
-        if self._endpoints is not None:
-            await self._endpoints.close()
+        await self._players.close()
         with suppress(OSError):
             await self._log.flushed()
         self._log.close()
@@ -428,8 +419,7 @@ class Live:
         if running is None:
             return
         self.arenas[game.block].give(running.episode.env)
-        for seat, policy in running.episode.acting.items():
-            self._policies[game.block, seat].append(policy)
+        self._players.give(game.block, running.episode)
         if running.thinking is not None:
             running.thinking.stop()
 
@@ -440,11 +430,11 @@ class Live:
             arena, played = self.arenas[game.block], game.episode
             assert played is not None, "internal: a game begins with an episode"
             env = arena.take()
-            thinking = self._thinking_of(game.block)
+            thinking = self._players.thinking(game.block)
             watching = () if thinking is None else tuple(thinking.seats.values())
             episode = Episode(
                 arena,
-                self._agents_of(game.block, env),
+                self._players.agents(game.block, env),
                 reset_of(game.block, played.room),
                 env,
                 watching,
@@ -458,52 +448,6 @@ class Live:
             if episode.ending is not None and played.ended is None:  # the server died in between
                 self._end(game, found)
         return found
-
-    def _check_agents(self) -> None:
-        """See that the trained agents that are named can sit where they are to. Raises UsageError."""
-        for number in range(len(self._study.blocks)):
-            env = self.arenas[number].take()
-            try:
-                for seat, make in self._agents_of(number, env).items():
-                    self._policies[number, seat].append(make())
-            except ValueError as error:
-                raise UsageError(f"block {number + 1}: {error}") from None
-            self.arenas[number].give(env)
-
-    def _others(self, block: int) -> dict[Seat, str]:
-        """Who may choose the acts of seats in a block besides people."""
-        return {} if block == PRACTICE else players_of(self._study.blocks[block])
-
-    def _agents_of(self, block: int, env: Any) -> dict[Seat, Callable[[], Any]]:
-        """What makes the trained agents that may play in a block; one that is free is taken again."""
-
-        def make(seat: Seat, who: str) -> Any:
-            free = self._policies[block, seat]
-            return free.pop() if free else agent_of(who, self._loaded.folder, env)
-
-        trained = {seat: who for seat, who in self._others(block).items() if is_trained(who)}
-        return {seat: partial(make, seat, who) for seat, who in trained.items()}
-
-    def _asked_models(self) -> Endpoints | None:
-        """Where the language models of the study are asked; None if it has none. Raises UsageError."""
-        named = models_of(self._study)
-        if not named:
-            return None
-        require_models()
-        from socialai_dsl.study.models import Endpoints
-
-        return Endpoints(named, asked_by(self._study, self._loaded.folder))
-
-    def _thinking_of(self, block: int) -> Thinking | None:
-        """The language models that may play in a game of a block; None if there are none."""
-        models = {seat: who for seat, who in self._others(block).items() if is_model(who)}
-        if not models or self._endpoints is None:
-            return None
-        from socialai_dsl.study.models import ModelSeat, Thinking
-
-        arena, endpoints = self.arenas[block], self._endpoints
-        seats = {seat: ModelSeat(arena, seat, who, endpoints) for seat, who in models.items()}
-        return Thinking(seats, self._study.blocks[block].act_within)
 
     def _act(self, person: Participant, page: Page, message: Act) -> Iterable[str]:
         game = self.progress.games[person.game or ""]
@@ -845,33 +789,6 @@ class Live:
         for number, name in enumerate(self._loaded.pictures):
             made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
         return made
-
-
-def require_models() -> None:
-    """Say how to install what language models need if it is missing. Raises UsageError."""
-    if find_spec("httpx") is None:
-        raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
-
-
-def agent_of(who: str, folder: Path, env: Any) -> Any:
-    """The policy of a trained agent.
-
-    Args:
-        who: `shipped:NAME`, or the path of a checkpoint or a run's folder, relative to the folder of the study's file.
-        folder: see above.
-        env: what it is to play.
-
-    Raises:
-        UsageError: the trainer is not installed, or somebody else played in the folder.
-        ValueError: the agent does not fit.
-    """
-    from socialai_dsl.episodes.players import Player, make_policy, played_again, require_trainer
-
-    require_trainer()
-    player = Player(played_again(who if who.startswith(PREFIX) else str(folder / who)))
-    if not player.is_trained:
-        raise UsageError(f"{who}: {player.agent!r} played there, expected a trained agent")
-    return make_policy(player, env)[0]
 
 
 def _fits(question: Question, answer: str | int) -> bool:

@@ -38,8 +38,8 @@ from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import closest_script, load, variant_of
 from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Action, Arena, Episode
-from socialai_dsl.study.live import agent_of, require_models
 from socialai_dsl.study.messages import Screen
+from socialai_dsl.study.players import agent_of, require_models
 from socialai_dsl.study.replay import StudyData, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of

@@ -13,8 +13,8 @@ from socialai_dsl.cli.main import main
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.study.arena import Arena, Episode
-from socialai_dsl.study.live import agent_of
 from socialai_dsl.study.log import FILE, read_log
+from socialai_dsl.study.players import agent_of
 from socialai_dsl.study.progress import Progress
 from socialai_dsl.study.rehearsal import KINDS, rehearse
 from socialai_dsl.study.replay import reset_of

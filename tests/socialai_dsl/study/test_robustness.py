@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import resource
 import signal
 import subprocess
 import sys
@@ -28,6 +27,7 @@ from socialai_dsl.study.log import FILE, read_log
 from socialai_dsl.study.replay import study_data
 from tests.socialai_dsl.study.participants import loaded_study
 
+resource = pytest.importorskip("resource", reason="limits are those of POSIX")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and limits are those of POSIX")
 
 STUDY = """\

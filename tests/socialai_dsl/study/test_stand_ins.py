@@ -14,8 +14,9 @@ import pytest
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
 from socialai_dsl.study.arena import Arena, Episode
-from socialai_dsl.study.live import Live, agent_of
+from socialai_dsl.study.live import Live
 from socialai_dsl.study.log import FILE, read_log
+from socialai_dsl.study.players import agent_of
 from socialai_dsl.study.replay import study_data
 from tests.socialai_dsl.llm.endpoint import Stub, endpoint
 from tests.socialai_dsl.study.participants import Clock, Taking, loaded_study, newcomer, run
