@@ -36,6 +36,13 @@ def check_speakers(resolver: Resolver, spoken: Spoken) -> None:
                     )
                     hint = "language models read `You hear:` and `2 steps ahead: a door`; choose another name"
                     findings.error("S405", message, findings.at(path), hint=hint)
+    if symbols.scenario.observe.names == "hidden":
+        for line in _of_npcs(spoken):
+            begun = (re.match("([^:]+): ", composed(text)) for text in texts_of(line))
+            said = next((one for one in begun if one is not None), None)
+            if said is not None:
+                message = f"`{said[0]}` reads as the name of who speaks, though names are hidden"
+                findings.error("S405", message, line.span, hint="leave the colon out")
     tone = symbols.scenario.observe.tone
     look = symbols.scenario.looks.get(tone) if tone is not None else None
     if look is None:

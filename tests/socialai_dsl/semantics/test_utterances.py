@@ -108,9 +108,12 @@ def test_names_are_one_speaker_to_all_who_hear_them(examine, name, others, codes
         (("by the way", "by  the way"), "shown", []),
         (("by the way", "by\u200d the way"), "shown", ["W406"]),
         (("Caf\u00e9", "Cafe\u0301"), "shown", ["W406"]),
+        (("You: turn left", "Yes"), "shown", []),
+        (("You: turn left", "Yes"), "hidden", ["S405"]),
+        (("It is 10:30", "Yes"), "hidden", []),
     ],
 )
-def test_texts_that_look_alike_and_are_not(examine, lines, names, codes):
+def test_texts_that_look_alike_and_are_not_or_like_anothers(examine, lines, names, codes):
     first, second = ({"hears": "How are you", "when": f"t == {t}", "say": say} for t, say in enumerate(lines))
     frames = {"talk": {"states": {"a": {"then": [first, second]}}}}
     found = examine(frames=frames, cast={"guide": {"frame": "talk"}}, observe={"names": names}).diagnostics
