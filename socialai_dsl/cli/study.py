@@ -13,6 +13,8 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine
 from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import LoadedStudy, load_study
+from socialai_dsl.loader.reader import shipped_studies
+from socialai_dsl.loader.shipped import file_named
 from socialai_dsl.study import FIRST_PORT, FOLDER
 
 SUMMARY: Final = "let people take part in a study in the browser, and make tables of what they did"
@@ -94,7 +96,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("status", status, _status),
         ("data", data, _data),
     ):
-        command.add_argument("file", metavar="FILE", help="the file of a study")
+        command.add_argument(
+            "file", metavar="FILE", help="the file of a study, or the name of one that ships"
+        )
         usual = "default: none is kept" if command is rehearse else f"default: {FOLDER}/NAME"
         command.add_argument(
             "--out", type=Path, metavar="DIR", help=f"folder of all that is stored ({usual})"
@@ -104,12 +108,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Do what the command's command says."""
-    result: Exit = arguments.act(arguments, load_study(arguments.file))
+    result: Exit = arguments.act(
+        arguments, load_study(file_named(arguments.file, "study", shipped_studies()))
+    )
     return result
 
 
 def _folder(arguments: argparse.Namespace, loaded: LoadedStudy) -> Path:
     folder: Path = arguments.out or Path(FOLDER) / loaded.study.study
+    return folder
+
+
+def _begun(arguments: argparse.Namespace, loaded: LoadedStudy) -> Path:
+    """The folder of a study in which somebody may have taken part. Raises UsageError."""
+    from socialai_dsl.study.log import FILE
+
+    folder = _folder(arguments, loaded)
+    if not (folder / FILE).exists():
+        raise UsageError(f"there is no study in {folder}: `socialai study run {arguments.file}` begins one")
     return folder
 
 
@@ -162,7 +178,7 @@ def _rehearse(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
 def _status(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
     from socialai_dsl.study.status import status_of
 
-    status = status_of(loaded, _folder(arguments, loaded))
+    status = status_of(loaded, _begun(arguments, loaded))
     if arguments.json:
         print(json.dumps(asdict(status), indent=2))
         return Exit.GOOD
@@ -186,7 +202,7 @@ def _data(arguments: argparse.Namespace, loaded: LoadedStudy) -> Exit:
     from socialai_dsl.study.data import write_data
     from socialai_dsl.study.replay import study_data
 
-    folder = _folder(arguments, loaded)
+    folder = _begun(arguments, loaded)
     data = study_data(loaded, folder)
     written = write_data(data, loaded, arguments.to or folder / "data", arguments.parquet)
     unended = f", {data.unended} more have not ended" if data.unended else ""

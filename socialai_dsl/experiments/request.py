@@ -14,7 +14,7 @@ from socialai_dsl.experiments.document import differences, document_of
 from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, PlannedRun, read_experiment, runs_of
 from socialai_dsl.frontend import load_experiment
 from socialai_dsl.loader.reader import shipped_experiments
-from socialai_dsl.loader.resolved import looks_like_path
+from socialai_dsl.loader.shipped import file_named
 
 _CHANGES_SHOWN: Final = 10
 
@@ -38,13 +38,7 @@ def requested(name: str, profile: str | None, out: Path | None) -> tuple[dict[st
                 f"{given} is a folder, which says itself what is run; --out and --profile are for files"
             )
         return read_experiment(given), given
-    if not given.exists() and not looks_like_path(name):
-        shipped = shipped_experiments()
-        if name not in shipped:
-            hint = suggested(name, shipped, f"; those that are shipped are {', '.join(shipped)}")
-            raise UsageError(f"there is no experiment {name!r}{hint}")
-        given = shipped[name]
-    loaded = load_experiment(given)
+    loaded = load_experiment(file_named(name, "experiment", shipped_experiments()))
     chosen = _profile(loaded, profile)
     document = document_of(loaded, chosen)
     called = document["name"]

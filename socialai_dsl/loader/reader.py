@@ -596,10 +596,18 @@ def shipped_folder() -> Path:
 
 def shipped_experiments() -> dict[str, Path]:
     """The files of the experiments that come with the product, by name."""
+    return {path.stem: path for path in sorted(_experiments().glob("*.yaml"))}
+
+
+def shipped_studies() -> dict[str, Path]:
+    """The files of the studies that come with the product, by name."""
+    return {path.stem: path for path in sorted((_experiments() / "studies").glob("*.yaml"))}
+
+
+def _experiments() -> Path:
     package = Path(__file__).resolve().parent.parent
     installed = package / "experiments" / "shipped"
-    folder = installed if installed.is_dir() else package.parent / "experiments"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return installed if installed.is_dir() else package.parent / "experiments"
 
 
 class Library:

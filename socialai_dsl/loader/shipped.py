@@ -1,14 +1,16 @@
 """Which scenarios ship, and which of the other files are only variants of them."""
 
 import posixpath
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.diagnostics import ScenarioError, suggested
+from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.reader import read_document, shipped_folder
-from socialai_dsl.loader.resolved import TESTS, resolve
+from socialai_dsl.loader.resolved import TESTS, looks_like_path, resolve
 from socialai_dsl.vocabulary import spelt
 
 IDS: Final = {
@@ -41,6 +43,21 @@ class ShippedScenario:
     about: str
     variants: tuple[str, ...]
     parameters: dict[str, tuple[str, ...]]
+
+
+def file_named(name: str, kind: str, shipped: Mapping[str, Path]) -> Path:
+    """The file of a path, or of the name under which an experiment or a study ships.
+
+    Raises:
+        UsageError: there is no such file, and none of its kind ships under this name.
+    """
+    path = Path(name)
+    if path.exists() or looks_like_path(name):
+        return path
+    if name not in shipped:
+        hint = suggested(name, shipped, f"; those that are shipped are {', '.join(shipped)}")
+        raise UsageError(f"there is no {kind} {name!r}{hint}")
+    return shipped[name]
 
 
 def catalogue() -> list[ShippedScenario]:

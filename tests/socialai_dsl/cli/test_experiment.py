@@ -128,6 +128,10 @@ def test_shipped_experiments_have_names(
     assert "CoinThief" in capsys.readouterr().out
     assert main(["experiment", "plan", "case_study"]) == 2
     assert "there is no experiment 'case_study'; did you mean case_studies?" in capsys.readouterr().err
+    assert main(["study", "status", "askin", "--out", "there"]) == 2
+    assert "there is no study 'askin'; did you mean asking?" in capsys.readouterr().err
+    assert main(["study", "status", "asking", "--out", "there"]) == 2
+    assert "there is no study in there" in capsys.readouterr().err
 
 
 def test_a_file_with_mistakes(file: Path, capsys: Capture) -> None:
