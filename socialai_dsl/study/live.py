@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -44,6 +45,14 @@ _DROPPED: Final = 3600
 
 
 @dataclass(eq=False)
+class _Due:
+    """A screen, and whether all that led to it is stored."""
+
+    screen: Screen
+    stored: bool = False
+
+
+@dataclass(eq=False)
 class Page:
     """An open page of a participant.
 
@@ -62,6 +71,7 @@ class Page:
     knows: str | None = None
     elsewhere: bool = False
     _tokens: float = _BURST
+    _due: deque[_Due] = field(default_factory=deque)
 
     def may_speak(self, now: float) -> bool:
         """Whether it has not sent too much; counts one more message."""
@@ -69,6 +79,22 @@ class Page:
         self.sign = now
         self._tokens -= 1
         return self._tokens >= 0
+
+    def will_show(self, screen: Screen) -> _Due:
+        """A screen that is shown behind those before it, once `show` is told that it may be."""
+        self._due.append(_Due(screen))
+        return self._due[-1]
+
+    def show(self, due: _Due) -> None:
+        """Show a screen, as soon as those before it are."""
+        due.stored = True
+        while self._due and self._due[0].stored:
+            self.send(self._due.popleft().screen)
+
+    def show_at_once(self, screen: Screen) -> None:
+        """Show a screen in place of those that have not been shown, of which nothing is true any more."""
+        self._due.clear()
+        self.send(screen)
 
 
 @dataclass(frozen=True)
@@ -210,16 +236,16 @@ class Live:
     async def _show(self, people: Iterable[str]) -> None:
         """Show people where they are once everything that led there is stored."""
         pages = [self.pages[person] for person in dict.fromkeys(people) if person in self.pages]
-        screens = [(page, self.screen(page)) for page in pages]
+        screens = [(page, page.will_show(self.screen(page))) for page in pages]
         try:
             await self._log.flushed()
         except OSError:
             self._forget()
             for page in tuple(self.pages.values()):
-                page.send({**self.screen(page), "notice": "disk"})
+                page.show_at_once({**self.screen(page), "notice": "disk"})
             return
-        for page, screen in screens:
-            page.send(screen)
+        for page, due in screens:
+            page.show(due)
 
     def _forget(self) -> None:
         """Be where the disk says, after something could not be stored."""

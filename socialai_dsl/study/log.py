@@ -56,6 +56,7 @@ class Log:
         self._began = time.monotonic()
         self._waiting: list[bytes] = []
         self._stored: asyncio.Future[None] | None = None
+        self._written: asyncio.Future[None] | None = None  # of what is being written now
         self._flushing: asyncio.Task[None] | None = None
 
     def add(self, event: str, **more: Any) -> Event:
@@ -80,15 +81,16 @@ class Log:
             if self._flushing is None:
                 self._flushing = loop.create_task(self._flush())
             await asyncio.shield(stored)
-        elif self._flushing is not None:
-            await asyncio.shield(self._flushing)
+        elif self._written is not None:  # and not what comes later, which may be without end
+            await asyncio.shield(self._written)
 
     async def _flush(self) -> None:
         """Write what waits, and what comes meanwhile, until nothing is left."""
+        loop = asyncio.get_running_loop()
         try:
             while self._waiting:
-                lines, stored = b"".join(self._waiting), self._stored
-                self._waiting, self._stored = [], None
+                lines, stored = b"".join(self._waiting), self._stored or loop.create_future()
+                self._waiting, self._stored, self._written = [], None, stored
                 try:
                     await asyncio.to_thread(self._write, lines)
                 except OSError as error:
@@ -96,11 +98,11 @@ class Log:
                     for waits in (stored, later):  # what came later depends on what could not be written
                         if waits is not None:
                             waits.set_exception(OSError(error.errno, error.strerror))
+                            waits.exception()  # nobody may wait for it
                     return
-                if stored is not None:
-                    stored.set_result(None)
+                stored.set_result(None)
         finally:
-            self._flushing = None
+            self._flushing = self._written = None
 
     def _write(self, lines: bytes) -> None:
         try:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import random
 import shutil
+import threading
 from collections import Counter
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -21,7 +23,7 @@ from socialai_dsl.study import log
 from socialai_dsl.study.columns import COLUMNS
 from socialai_dsl.study.data import write_data
 from socialai_dsl.study.live import FAST, TAKEN, Live
-from socialai_dsl.study.log import FILE, read_log
+from socialai_dsl.study.log import FILE, Log, read_log
 from socialai_dsl.study.replay import StudyData, study_data
 from socialai_dsl.study.status import status_of
 from tests.socialai_dsl.study.participants import (
@@ -381,6 +383,36 @@ def test_two_who_are_there_play_together_and_see_their_own_seats(place: Path, tm
     (step,) = [event for event in read_log(tmp_path / FILE) if event["event"] == "step"]
     assert step["by"] == {"agent": "person", "jill": "person"}
     assert [time["movement"] for time in step["times"].values()] == ["left", "forward"]
+
+
+def test_pictures_come_in_the_order_in_which_things_happened(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever chose first waits; a slow disk must not bring that picture behind the next one, where nobody waits."""
+    gate, write = threading.Event(), Log._write
+
+    def slowly(log: Log, lines: bytes) -> None:
+        gate.wait(60)
+        write(log, lines)
+
+    async def play() -> None:
+        live = Live(loaded_study(TOGETHER, place), tmp_path, Clock())
+        one, two = await newcomer(live), await newcomer(live)
+        await one.go()
+        await two.go()
+        await live.tick()
+        monkeypatch.setattr(Log, "_write", slowly)
+        under_way = [asyncio.create_task(newcomer(live))]
+        await asyncio.sleep(0.1)  # it is being written
+        for taking in (one, two):
+            under_way.append(asyncio.create_task(taking.act("left")))  # type: ignore[arg-type]
+            await asyncio.sleep(0)
+        gate.set()
+        await asyncio.gather(*under_way)
+        assert [(screen["t"], screen["waiting"]) for screen in one.screens[-2:]] == [(0, True), (1, False)]
+        await live.close()
+
+    run(play)
 
 
 def test_the_script_takes_the_seat_for_which_nobody_comes(place: Path, tmp_path: Path) -> None:
