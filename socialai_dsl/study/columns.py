@@ -35,6 +35,7 @@ _OWN: Final[dict[str, dict[str, str]]] = {
         "others": "who has the other seats, as seat=who",
         "steps": "steps of the episode",
         "own_steps": "steps that the participant chose",
+        "stood_in": "acts that somebody else chose for another participant of the game",
         "utterances": "how often the seat said something",
         "success": "whether it was a success of the seat",
         "outcome": "the scenario's own name of the ending",

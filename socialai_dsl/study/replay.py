@@ -249,9 +249,8 @@ class _Tables:
             raise ValueError(f"the episode came out as {came}, and the log says {event['outcome']!r}")
         self._replayed += 1
         self._rules(game, event, going)
-        for seat, who in game.seats.items():
-            if who not in self._progress.people:
-                continue
+        people = {seat: who for seat, who in game.seats.items() if who in self._progress.people}
+        for seat, who in people.items():
             of, gone = self._of[who], who in game.gone
             if game.block != PRACTICE:
                 of.episodes += 1
@@ -271,6 +270,9 @@ class _Tables:
                     "others": " ".join(others),
                     "steps": episode.t,
                     "own_steps": going.chosen[seat],
+                    "stood_in": sum(
+                        episode.t - going.chosen[s] for s, other in people.items() if other != who
+                    ),
                     "utterances": going.asking.utterances[0][seat],
                     "success": event["success"][seat],
                     "outcome": event["outcome"],

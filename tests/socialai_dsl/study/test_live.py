@@ -489,9 +489,15 @@ def agree(data: StudyData) -> None:
         if row["by"] == "person"
     )
     lasted = Counter((row["game"], row["trial"], row["seat"]) for row in data.tables["steps"])
+    stood_in = Counter(
+        (row["game"], row["trial"])
+        for row in data.tables["steps"]
+        if row["participant"] and row["by"] != "person"
+    )
     won = Counter[str]()
     for row in data.tables["episodes"]:
         assert row["own_steps"] == chosen[row["participant"], row["game"], row["trial"]]
+        assert row["stood_in"] == stood_in[row["game"], row["trial"]] - (row["steps"] - row["own_steps"])
         assert row["steps"] == lasted[row["game"], row["trial"], row["seat"]]
         won[row["participant"]] += row["block"] != "practice" and row["success"] and not row["left"]
     for person in data.tables["participants"]:
@@ -561,6 +567,8 @@ def test_the_script_takes_over_when_somebody_leaves_and_hands_back(place: Path, 
     assert data.replayed == 2
     agree(data)
     assert [row["left"] for row in data.tables["participants"]] == [0, 1]
+    stood_in = {row["participant"]: row["stood_in"] for row in data.tables["episodes"] if row["trial"] == 1}
+    assert (stood_in["p0001"], stood_in["p0002"]) == (2, 0)
 
 
 def test_who_is_late_is_not_waited_for(place: Path, tmp_path: Path) -> None:
