@@ -71,6 +71,7 @@ class _Author:
         self.rng = rng
         self.declared = Declared()
         self.phrases = Phrases(rng, self.declared)
+        self.taken: set[str] = set()  # places with room for one, where somebody is put already
 
     def often(self, probability: float) -> bool:
         """Whether something happens."""
@@ -591,14 +592,11 @@ class _Author:
         if self.often(0.3):
             made["kind"] = self.rng.choice(("guide", "child"))
         if self.often(0.4):
-            made["place"] = self.rng.choice(
-                (
-                    "left_half",
-                    "right_half",
-                    "anywhere where not here.in_line(agent)",
-                    *(f"next_to({name})" for name in self.declared.lets if alone),
-                )
-            )
+            beside = [f"next_to({name})" for name in self.declared.lets if alone]
+            free = [place for place in beside if place not in self.taken]
+            whole = ("left_half", "right_half", "anywhere where not here.in_line(agent)")
+            made["place"] = self.rng.choice((*whole, *free))
+            self.taken.update({made["place"]} & set(beside))
         if self.often(0.4):
             made["facing"] = self.rng.choice(("down", "pick(left | up)", "toward(agent)"))
         if self.often(0.3):
