@@ -104,10 +104,16 @@ def test_success_is_knowable_unless_a_recipe_says_otherwise(path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("path", CLAIMING, ids=lambda path: path.stem)
 def test_what_a_recipe_claims_holds_in_many_rooms(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code = main.main(["check", str(path), "--rooms", "60", "--seconds", "0", "--strict"])
-    assert code == 0, capsys.readouterr().out
+    """What it does not claim itself, that all can be known, may be undecided in some room."""
+    code = main.main(["check", str(path), "--rooms", "60", "--seconds", "0"])
+    said = capsys.readouterr().out
+    assert code == 0, said
+    undecided = set(re.findall(r"^ *undecided: `(.+?)`", said, re.MULTILINE))
+    claimed = {plan.text for plan in socialai_dsl.load(path).checked.properties}  # type: ignore[union-attr]
+    assert not undecided & claimed, said
 
 
 def test_many_recipes_claim_something() -> None:

@@ -44,6 +44,10 @@ _FEW_STATES: Final = 2_000
 """The number of sequences, among those that tell rooms apart, after which a solution is searched, and the number of
 states of each search."""
 
+_SEARCHES: Final = 2
+"""How many times the states that may be looked at together are looked at in rooms that look different, at most; each
+state after which they do begins a search of its own."""
+
 
 class GuessingVerdict(Enum):
     """Whether a policy does better than a guess."""
@@ -138,6 +142,7 @@ class Guessing:
         start = self._start(registers, boards, keys)
         self._solvable.clear()
         self._effort, self._surely = effort, surely
+        self._left = _SEARCHES * effort.states
         if plans and (known := self._walked(start, plans, len(plans))) is not None:
             return known
         few = _NEAR * len(self._useful) // len(self._actions)
@@ -279,11 +284,16 @@ class Guessing:
         known = states, self._relevance.of_rows(registers).tobytes()
         if known not in self._solvable:
             start = registers, state.boards[0, room], state.keys[0, room]
+            if self._left <= 0:
+                return SearchVerdict.UNDECIDED
             # Chance makes many states, but where success is not rare a few walks find it.
             if self._alone.stumbles(*start):
+                self._left -= _WALKS
                 self._solvable[known] = SearchVerdict.SOLVABLE
             else:
-                self._solvable[known] = self._alone.solve(*start, states, self._effort.clock).verdict
+                found = self._alone.solve(*start, states, self._effort.clock)
+                self._left -= _WALKS + found.states
+                self._solvable[known] = found.verdict
         return self._solvable[known]
 
     # -- steps --

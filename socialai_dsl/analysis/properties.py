@@ -476,12 +476,22 @@ def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     return tally.report(said + ("" if exact else _AS_TRIED), 1.0 if plan.share is None else plan.share)
 
 
+_LEFT: Final = {
+    Knowability.HIDDEN: GuessingVerdict.GUESSES,
+    Knowability.ALL: GuessingVerdict.KNOWS,
+    Knowability.NOTHING_TO_KNOW: GuessingVerdict.KNOWS,
+    Knowability.UNDECIDED: GuessingVerdict.UNDECIDED,
+}
+"""What is left to an agent, by what it can know."""
+
+
 class _Needing:
     """What is left without some members, in room after room, and whether there is more with them."""
 
     def __init__(self, trial: Trial, plan: PropertyPlan, effort: Effort) -> None:
         self._trial, self._plan, self._effort = trial, plan, effort
-        silent = compiled(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
+        self._muted = muted(trial.loaded.checked, plan.members)
+        self._silent = silent = compiled(replace(trial.loaded, checked=self._muted))
         self._search = Search(silent)
         self._alone = DrawnRooms.numbered(silent, effort.rooms, effort.seed)
         self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
@@ -517,7 +527,29 @@ class _Needing:
         if best.answer is GuessingVerdict.TELLS_APART and self.told is None:
             told = self._without[found.index(best)].told(room, self._effort, self._tellers)
             self.told = None if told is None else f"in room {room} {told}"
+        if best.answer is GuessingVerdict.KNOWS and self._plan.any_draw:
+            return self._by_other_draws(room, finding)
         return best.answer, best.exact
+
+    def _by_other_draws(self, room: int, alone: Finding) -> tuple[GuessingVerdict | str, bool]:
+        """Whether something that has no name, such as where things lie, stays hidden without them, and only so."""
+        known = self._knowing_alone.look_at(room).known
+        if known is Knowability.NO_SUCCESS:
+            return self._with_them(room, alone)
+        if known is Knowability.HIDDEN:
+            known = self._knowing.look_at(room).known
+            if known is Knowability.HIDDEN:
+                return _ALWAYS_A_GUESS, True
+            known = Knowability.HIDDEN if known is not Knowability.UNDECIDED else known
+        return _LEFT[known], True
+
+    @cached_property
+    def _knowing_alone(self) -> Knowing:
+        return Knowing(RoomFacts(self._muted, self._silent, self._effort), self._effort)
+
+    @cached_property
+    def _knowing(self) -> Knowing:
+        return Knowing(self._trial.rooms, self._effort, self._trial.scripted)
 
     def _alone_in(self, room: int, states: int) -> Finding:
         """Whether a success can be reached without them."""

@@ -197,7 +197,8 @@ class _Entry:
                 found = tuple((path, values) for path in tried if len(set(values := _values(lets[path]))) > 1)
                 if entry.draw is not None and not found:
                     raise self._not_a_pick((*self._path, "draw"), entry.draw)
-                return replace(plan, text=f"needs: {', '.join(members)}", members=members, draws=found)
+                text, any_draw = f"needs: {', '.join(members)}", entry.draw is None
+                return replace(plan, text=text, members=members, draws=found, any_draw=any_draw)
             case "only_through":
                 assert entry.only_through is not None, "internal: there is a value for this key"
                 word, by = entry.only_through.draw, entry.only_through.by

@@ -460,7 +460,8 @@ class PropertyPlan:
     `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
     read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
-    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
+    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough, or with `any_draw`
+    whatever else a room draws. `expected`: whether
     what success depends on is to be `knowable`, or not to be. `rival`: whose share of rooms is at most `share`.
     `frames`: of `dilemma`, of those who cooperate and of those who defect.
     `unasked`: why there is nothing to try: what a patch fixed or took away.
@@ -476,6 +477,7 @@ class PropertyPlan:
     steps: int = 0
     members: tuple[str, ...] = ()
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    any_draw: bool = False
     expected: bool = True
     rival: str = ""
     frames: tuple[str, ...] = ()

@@ -356,3 +356,53 @@ def test_a_violation_can_be_pasted_into_a_terminal(
     assert words[-2:-1] == ["--do"]
     assert main([*words, "--json"]) == 0
     assert "gate.open" in capsys.readouterr().out
+
+
+# What is to be known is drawn by no `let`: where a thing lies. Ada points at it for whoever looks at her.
+HELD = """
+scenario: held
+horizon: 20
+grammar: body
+actions: [left, right, forward, toggle]
+room: {size: 5}
+observe: {channels: [type, color, status, orientation, pointing, last_act]}
+objects:
+  boxes: {type: box, count: 2, color: red, at: [[1, 1], [3, 1]]}
+  apple: {type: apple, inside: pick(boxes)}
+frames:
+  show:
+    states:
+      waiting: {do: point(apple.inside)}
+cast:
+  ada: {at: [2, 2], frame: show}
+  agent: {at: [2, 3], facing: up}
+outcome:
+  - {success: any(b in boxes where b.opened and b == apple.inside)}
+  - failure: any(b in boxes where b.opened)
+check: [{needs: ada}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict", "said"),
+    [
+        ([], Verdict.HOLDS, "leave nothing but a guess"),
+        ([("color: red, at: [[1, 1], [3, 1]]}", "color: distinct, at: [[1, 1], [3, 1]]}")], Verdict.HOLDS, "a guess"),
+        ([("count: 2, color: red, at: [[1, 1], [3, 1]]", "count: 1, at: [[1, 1]]")], Verdict.FAILS, "known"),
+        ([("  - failure: any(b in boxes where b.opened)\n", "")], Verdict.FAILS, "it can be known without"),
+    ],
+)  # fmt: skip
+def test_what_no_name_draws_is_needed_as_well(
+    tmp_path: Path, changes: list[tuple[str, str]], verdict: Verdict, said: str
+) -> None:
+    text = HELD
+    for old, new in changes:
+        assert old in text, "nothing would change"
+        text = text.replace(old, new)
+    (tmp_path / "held.yaml").write_text(text, encoding="utf-8")
+    loaded = socialai_dsl.load(tmp_path / "held.yaml")
+    assert isinstance(loaded, socialai_dsl.LoadedScenario)
+    (plan,) = loaded.checked.properties
+    report = Trial(loaded, Effort(4)).check(plan, Effort(4))
+    assert report.verdict is verdict, report.said
+    assert said in report.said
