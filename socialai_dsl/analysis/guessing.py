@@ -45,8 +45,8 @@ _FEW_STATES: Final = 2_000
 states of each search."""
 
 _SEARCHES: Final = 2
-"""How many times the states that may be looked at together are looked at in rooms that look different, at most; each
-state after which they do begins a search of its own."""
+"""Searches of single rooms begin wherever rooms come to look different; once they have looked at this many times
+`effort.states`, no further one begins."""
 
 
 class GuessingVerdict(Enum):

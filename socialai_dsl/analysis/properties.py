@@ -477,12 +477,11 @@ def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
 
 
 _LEFT: Final = {
-    Knowability.HIDDEN: GuessingVerdict.GUESSES,
     Knowability.ALL: GuessingVerdict.KNOWS,
     Knowability.NOTHING_TO_KNOW: GuessingVerdict.KNOWS,
     Knowability.UNDECIDED: GuessingVerdict.UNDECIDED,
 }
-"""What is left to an agent, by what it can know."""
+"""What an agent is left with where nothing that success depends on stays hidden, or it is not found out."""
 
 
 class _Needing:
@@ -532,16 +531,17 @@ class _Needing:
         return best.answer, best.exact
 
     def _by_other_draws(self, room: int, alone: Finding) -> tuple[GuessingVerdict | str, bool]:
-        """Whether something that has no name, such as where things lie, stays hidden without them, and only so."""
+        """Whether a draw without a name, such as where things lie, stays hidden without them, and only without them."""
         known = self._knowing_alone.look_at(room).known
         if known is Knowability.NO_SUCCESS:
             return self._with_them(room, alone)
-        if known is Knowability.HIDDEN:
-            known = self._knowing.look_at(room).known
-            if known is Knowability.HIDDEN:
-                return _ALWAYS_A_GUESS, True
-            known = Knowability.HIDDEN if known is not Knowability.UNDECIDED else known
-        return _LEFT[known], True
+        if known is not Knowability.HIDDEN:
+            return _LEFT[known], True
+        with_them = self._knowing.look_at(room).known
+        if with_them is Knowability.HIDDEN:
+            return _ALWAYS_A_GUESS, True
+        undecided = with_them is Knowability.UNDECIDED
+        return GuessingVerdict.UNDECIDED if undecided else GuessingVerdict.GUESSES, True
 
     @cached_property
     def _knowing_alone(self) -> Knowing:

@@ -135,7 +135,7 @@ def is_model(who: str) -> bool:
 
 
 def rival_of(who: str) -> str | None:
-    """The rival of the scenario that is meant, by its name there; None if somebody else is."""
+    """NAME of `rival:NAME`; None of any other player."""
     return who.removeprefix(RIVAL_PREFIX) if who.startswith(RIVAL_PREFIX) else None
 
 

@@ -120,7 +120,7 @@ def _folder(arguments: argparse.Namespace, loaded: LoadedStudy) -> Path:
 
 
 def _begun(arguments: argparse.Namespace, loaded: LoadedStudy) -> Path:
-    """The folder of a study in which somebody may have taken part. Raises UsageError."""
+    """The folder of a study. Raises UsageError where the study has not begun."""
     from socialai_dsl.study.log import FILE
 
     folder = _folder(arguments, loaded)

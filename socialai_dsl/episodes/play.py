@@ -297,7 +297,7 @@ class Agenda(Protocol):
 
 
 class EachRoom:
-    """Rooms 0 to N - 1 of a set, an episode in each: whoever is free plays the next session that is left.
+    """One episode in each of the rooms 0 to N - 1 of a set: a free environment plays the next session.
 
     Args:
         episodes: N.

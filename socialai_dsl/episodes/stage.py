@@ -100,7 +100,7 @@ class Stage(Rooms):
         """See `Rooms.begin`."""
         options = reset.get("options") or {}
         for partner in self._partners:
-            number = options.get("test_episode") or 0 if reset.get("seed") is None else reset["seed"]
+            number = reset.get("seed") or options.get("test_episode") or 0
             partner.episode = int(number) + int(options.get("index") or 0)
         super().begin(reset, numbers, begun)
         self.moments = [self._now()]

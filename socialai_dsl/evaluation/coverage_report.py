@@ -100,12 +100,8 @@ def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -
             return clock.is_over
 
         with clock.until_interrupted():
-            play(
-                Rooms(envs, [counting]),
-                {AGENT: policy},
-                EachRoom(episodes, rooms=RoomSet.of_seed(seed)),
-                over,
-            )
+            agenda = EachRoom(episodes, rooms=RoomSet.of_seed(seed))
+            play(Rooms(envs, [counting]), {AGENT: policy}, agenda, over)
         return counting.watch.tally(counting.ended)
     except ValueError as error:
         raise UsageError(str(error)) from error

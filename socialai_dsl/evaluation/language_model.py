@@ -67,7 +67,7 @@ def let_models_play(
     episodes: int,
     out: Path,
     trials: int = 1,
-    rooms: RoomSet = TEST_ROOMS,
+    room_set: RoomSet = TEST_ROOMS,
 ) -> ModelEpisodes:
     """Let players, models among them, play test episodes 0 to `episodes - 1`; answers in transcripts are not asked for.
 
@@ -80,7 +80,7 @@ def let_models_play(
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
         trials: how many episodes in a row are one conversation.
-        rooms: which are played; the test set by default.
+        room_set: the rooms that are played; the test set by default.
 
     Raises:
         UsageError: an endpoint does not answer, or an option is not what was expected.
@@ -100,7 +100,7 @@ def let_models_play(
     words = _words(players, program) if len(players) > 1 else {}
     about: dict[str, Any] = {"scenario": scenario, "program_sha256": program.sha256, "trials": trials}
     about |= {"seat": own, "players": words} if words else {}
-    about |= {} if rooms.is_test_set else {"rooms": rooms.name}
+    about |= {} if room_set.is_test_set else {"rooms": room_set.name}
     progress = _Progress(episodes)
     try:
         if own not in seated:
@@ -117,7 +117,7 @@ def let_models_play(
             options.concurrency,
             progress.note,
             folder,
-            rooms,
+            room_set,
         )
     except SettingsMismatchError as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
@@ -174,7 +174,7 @@ def _model(
     return LanguageModelPlayer(program, endpoint, prompting, place, loaded, briefing, seat, budget)
 
 
-def episodes_of_models(run: Path, program: Playable, rooms: RoomSet, most: int) -> ModelEpisodes:
+def episodes_of_models(run: Path, program: Playable, room_set: RoomSet, most: int) -> ModelEpisodes:
     """The results of the first episodes with models, from their transcripts in the folder `run`.
 
     Raises:
@@ -183,7 +183,7 @@ def episodes_of_models(run: Path, program: Playable, rooms: RoomSet, most: int) 
     from socialai_dsl.llm.players import SettingsMismatchError, kept_games
 
     try:
-        kept = kept_games(program, run / TRANSCRIPTS, rooms, most)
+        kept = kept_games(program, run / TRANSCRIPTS, room_set, most)
     except SettingsMismatchError as error:
         raise UsageError(str(error)) from None
     if not kept.games:

@@ -213,12 +213,8 @@ def _play(scripted: str, played: _Played, seed: int, clock: Clock) -> None:
         return clock.is_over
 
     try:
-        play(
-            Rooms(envs, [played]),
-            {AGENT: ScriptedPolicy(envs)},
-            EachRoom(rooms, rooms=RoomSet.of_seed(seed)),
-            over,
-        )
+        agenda = EachRoom(rooms, rooms=RoomSet.of_seed(seed))
+        play(Rooms(envs, [played]), {AGENT: ScriptedPolicy(envs)}, agenda, over)
     finally:
         envs.close()
 

@@ -8,16 +8,18 @@ from socialai_dsl.runs.folder import RESULT
 _NUMBERS_SHOWN: Final = 8
 _RULES_SHOWN: Final = 12
 _TEXT_WIDTH: Final = 64
+_TEST: Final = "test"
 
 Row = tuple[str, str]
 
 
 def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     """Success with its interval, in all and in parts, such as seats and members of a suite; then length and return."""
+    rooms = figures.get("rooms", _TEST)  # older results know of no others
     manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
         ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} (Wilson)"),
-        ("episodes", f"{figures['episodes']} {_of_rooms(figures)}{manner}"),
+        ("episodes", f"{figures['episodes']} {_of_rooms(rooms)}{manner}"),
         ("mean length", f"{figures['mean_length']:.1f} steps"),
         ("mean return", f"{figures['mean_return']:.3f}"),
     ]
@@ -48,7 +50,7 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     for seat, found in figures.get("models", {}).items():
         rows += [(f"{name} of {seat}", value) for name, value in _model_rows(found)]
     if figures.get("unsolved"):
-        rows.append(("unsolved", _numbers(figures)))
+        rows.append(("unsolved", _numbers(figures["unsolved"], rooms)))
     return rows
 
 
@@ -126,15 +128,13 @@ def _shortened(text: str) -> str:
     return text if len(text) <= _TEXT_WIDTH else text[: _TEXT_WIDTH - 1] + "…"
 
 
-def _of_rooms(figures: Mapping[str, Any]) -> str:
-    rooms = figures.get("rooms", "test")  # older results know of no others
-    return "of the test set" if rooms == "test" else f"in rooms of {rooms.replace(':', ' ')}"
+def _of_rooms(rooms: str) -> str:
+    return "of the test set" if rooms == _TEST else f"in rooms of {rooms.replace(':', ' ')}"
 
 
-def _numbers(figures: Mapping[str, Any]) -> str:
-    """The first of the unsolved episodes; `result.json` has them all."""
-    episodes = figures["unsolved"]
+def _numbers(episodes: list[int], rooms: str) -> str:
+    """The first of a list of episodes; `result.json` has them all."""
     shown = ", ".join(map(str, episodes[:_NUMBERS_SHOWN]))
     more = len(episodes) - _NUMBERS_SHOWN
-    what = "test episodes" if figures.get("rooms", "test") == "test" else "rooms"
+    what = "test episodes" if rooms == _TEST else "rooms"
     return f"{what} {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")

@@ -309,7 +309,7 @@ def play_test_set(
     trials: int = 1,
     partners: Partners = MappingProxyType({}),
     observers: Sequence[Observer] = (),
-    chosen: RoomSet = TEST_ROOMS,
+    room_set: RoomSet = TEST_ROOMS,
 ) -> Evaluation:
     """Play rooms 0 to `episodes - 1` of the test set, or of other rooms, of a scenario.
 
@@ -323,7 +323,7 @@ def play_test_set(
         partners: who sits on other seats than the player. On those that are left it plays as well, a person, a
             language model or a rival on the first of them alone.
         observers: watch as well, where neither a person nor a language model plays.
-        chosen: the rooms.
+        room_set: the rooms.
 
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario, or a language model does not answer.
@@ -332,23 +332,23 @@ def play_test_set(
     endings, briefing = endings_of(loaded, program), player.briefing(loaded)
     own = own_seat(partners, program)
     if player.is_person:
-        person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing, chosen)
+        person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing, room_set)
         found = _of_person(person, scenario, loaded, program, player, own, partners, briefing)
-        return replace(found, rooms=chosen)
+        return replace(found, rooms=room_set)
     if player.is_model or player.rival is not None:  # which play on one seat alone
         partners = _with_idle(partners, own, program)
     if models := [one for one in (player, *partners.values()) if one.is_model]:
         players = {seat: partners.get(seat, player) for seat in seats_of(program)}
         place = models[0].kept_in
-        played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials, chosen)
+        played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials, room_set)
         found = _of_models(played, scenario, loaded, program, player, partners, briefing)
-        return replace(found, trials=trials, rooms=chosen)
+        return replace(found, trials=trials, rooms=room_set)
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
-        result = _result_of(playing, episodes, [kept, *observers], trials, chosen)
+        result = _result_of(playing, episodes, [kept, *observers], trials, room_set)
     told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
-    return replace(found, trials=trials, seat=own, partners=partners, rooms=chosen)
+    return replace(found, trials=trials, seat=own, partners=partners, rooms=room_set)
 
 
 def trace_test_episodes(
@@ -359,7 +359,7 @@ def trace_test_episodes(
     numbers: Sequence[int],
     trials: int = 1,
     partners: Partners = MappingProxyType({}),
-    chosen: RoomSet = TEST_ROOMS,
+    room_set: RoomSet = TEST_ROOMS,
 ) -> tuple[list[Trace], list[str]]:
     """Trace some test episodes as `play_test_set` plays them, without playing those before.
 
@@ -374,7 +374,7 @@ def trace_test_episodes(
         numbers: of the episodes.
         trials: how many in a row the player remembers.
         partners: see `play_test_set`.
-        chosen: see `play_test_set`.
+        room_set: see `play_test_set`.
 
     Returns:
         The traces, and what is to be known about the player.
@@ -386,9 +386,9 @@ def trace_test_episodes(
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, len(sessions)) as playing:
         rooms = Rooms(playing.envs, [kept], playing.own, playing.scripts)
-        play(rooms, playing.policies, EachRoom(sessions[-1] + trials, trials, iter(sessions), chosen))
+        play(rooms, playing.policies, EachRoom(sessions[-1] + trials, trials, iter(sessions), room_set))
     texts = {one.name: one.text for one in endings_of(loaded, program)}
-    played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners, chosen)
+    played = _Played(scenario, loaded, program, player, kept.played, trials, playing.own, partners, room_set)
     return played.traces(numbers, texts), playing.told
 
 
@@ -494,7 +494,7 @@ def _result_of(
     episodes: int,
     observers: Sequence[Observer] = (),
     trials: int = 1,
-    chosen: RoomSet = TEST_ROOMS,
+    room_set: RoomSet = TEST_ROOMS,
 ) -> EvalResult:
     """See `evaluate_policy`."""
     if episodes < 1:
@@ -505,7 +505,7 @@ def _result_of(
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]
     rooms = Rooms(envs, [results, *observers], playing.own, playing.scripts)
-    play(rooms, playing.policies, EachRoom(episodes, trials, rooms=chosen))
+    play(rooms, playing.policies, EachRoom(episodes, trials, rooms=room_set))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
     return results.result(fired)
 

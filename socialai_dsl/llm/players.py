@@ -181,13 +181,13 @@ class Kept:
     players: Mapping[Seat, str]
 
 
-def kept_games(program: Playable, folder: Path, chosen: RoomSet, most: int) -> Kept:
+def kept_games(program: Playable, folder: Path, room_set: RoomSet, most: int) -> Kept:
     """The first episodes that are over, from their transcripts; nobody is asked.
 
     Args:
         program: of the scenario that was played.
         folder: of the transcripts.
-        chosen: the rooms that were played.
+        room_set: the rooms that were played.
         most: how many episodes, at most.
 
     Raises:
@@ -202,7 +202,9 @@ def kept_games(program: Playable, folder: Path, chosen: RoomSet, most: int) -> K
     own, players = settings.get("seat", AGENT), settings.get("players", {})
     places = {seat: folder if seat == own else folder / seat for seat in players or (AGENT,)}
     models = {
-        seat: _kept_model(program, seat, place, chosen) for seat, place in places.items() if _has_model(place)
+        seat: _kept_model(program, seat, place, room_set)
+        for seat, place in places.items()
+        if _has_model(place)
     }
     envs = make_vec(
         program, copy=False, autoreset_mode="Disabled", seats="all" if len(players) > 1 else AGENT
@@ -217,7 +219,7 @@ def kept_games(program: Playable, folder: Path, chosen: RoomSet, most: int) -> K
         if seat in rooms.seats
     }
     try:
-        at_once(play_async(rooms, policies, EachRoom(most, settings["trials"], rooms=chosen)))
+        at_once(play_async(rooms, policies, EachRoom(most, settings["trials"], rooms=room_set)))
         return Kept(games.played()[:most], own, players)
     finally:
         envs.close()
@@ -237,7 +239,7 @@ def _has_model(folder: Path) -> bool:
     return (folder / _SETTINGS).is_file() and "model" in _settings_of(folder)
 
 
-def _kept_model(program: Playable, seat: Seat, folder: Path, chosen: RoomSet) -> ModelPolicy:
+def _kept_model(program: Playable, seat: Seat, folder: Path, room_set: RoomSet) -> ModelPolicy:
     """A model that says what it said before. Raises SettingsMismatchError where it is not known how it played."""
     settings = _settings_of(folder)
     try:
@@ -245,7 +247,9 @@ def _kept_model(program: Playable, seat: Seat, folder: Path, chosen: RoomSet) ->
     except (KeyError, TypeError):
         raise SettingsMismatchError(f"{folder} holds no transcripts of episodes") from None
     text = TextSeat(program, **prompting.of_episodes, seat=seat)
-    return ModelPolicy(text, prompting, partial(_transcript, folder), _nobody, compares=False, chosen=chosen)
+    return ModelPolicy(
+        text, prompting, partial(_transcript, folder), _nobody, compares=False, room_set=room_set
+    )
 
 
 async def _nobody(conversation: Conversation) -> Answer:
@@ -292,7 +296,7 @@ class LanguageModelPlayer:
         self,
         client: httpx.AsyncClient,
         failures: Sequence[Exception],
-        chosen: RoomSet = TEST_ROOMS,
+        room_set: RoomSet = TEST_ROOMS,
         progress: Callable[[PlayedEpisode], None] | None = None,
     ) -> ModelPolicy:
         """The model in one room.
@@ -300,7 +304,7 @@ class LanguageModelPlayer:
         Args:
             client: for its requests.
             failures: when there is one, in this room or another, no further request is made.
-            chosen: the rooms that are played.
+            room_set: the rooms that are played.
             progress: see `ModelPolicy`.
         """
 
@@ -321,7 +325,7 @@ class LanguageModelPlayer:
             seat=self.seat,
             loaded=self._loaded,
         )
-        return ModelPolicy(text, self._prompting, self._place, ask, progress, chosen=chosen)
+        return ModelPolicy(text, self._prompting, self._place, ask, progress, room_set=room_set)
 
     async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
         """The model's answer; also that the conversation has outgrown its context, which ends the episode."""
@@ -346,7 +350,7 @@ def play_games(
     concurrency: int = 1,
     progress: Callable[[PlayedEpisode], None] | None = None,
     keep: Path | None = None,
-    chosen: RoomSet = TEST_ROOMS,
+    room_set: RoomSet = TEST_ROOMS,
 ) -> list[PlayedGame]:
     """Play test episodes 0 to `episodes - 1`; what models have answered already is read from their transcripts.
 
@@ -358,14 +362,14 @@ def play_games(
         concurrency: how many are played at once.
         progress: is told of each episode that is over, as the first of the models played it.
         keep: a folder that gets the actions of all seats, where there are several.
-        chosen: the rooms; by default the test set.
+        room_set: the rooms; by default the test set.
 
     Raises:
         EndpointError: an endpoint does not answer. What was played is kept.
         SettingsMismatchError: a transcript is of an episode that goes another way now.
         OSError: a transcript cannot be read or written.
     """
-    return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep, chosen))
+    return asyncio.run(_play(models, company, episodes, trials, concurrency, progress, keep, room_set))
 
 
 async def _play(
@@ -376,7 +380,7 @@ async def _play(
     concurrency: int,
     progress: Callable[[PlayedEpisode], None] | None,
     keep: Path | None,
-    chosen: RoomSet,
+    room_set: RoomSet,
 ) -> list[PlayedGame]:
     sessions = iter(range(0, episodes, trials))
     tables: list[Games] = []
@@ -384,7 +388,7 @@ async def _play(
 
     async def work(clients: Sequence[httpx.AsyncClient]) -> None:
         policies = {
-            model.seat: model.policy(client, failures, chosen, None if number else progress)
+            model.seat: model.policy(client, failures, room_set, None if number else progress)
             for number, (model, client) in enumerate(zip(models, clients, strict=True))
         }
         with company() as beside:
@@ -393,7 +397,7 @@ async def _play(
             rooms = Rooms(beside.envs, [*policies.values(), games], beside.own, beside.scripts)
             playing = {seat: policies.get(seat) or beside.policies[seat] for seat in rooms.seats}
             try:
-                await play_async(rooms, playing, EachRoom(episodes, trials, sessions, chosen))
+                await play_async(rooms, playing, EachRoom(episodes, trials, sessions, room_set))
             except (EndpointError, OSError, SettingsMismatchError) as error:
                 failures.append(error)
 
@@ -511,7 +515,7 @@ class ModelPolicy(Observer):
             leave all that are left.
         progress: is told of each episode that is over.
         compares: whether what a transcript holds must be about what is seen now.
-        chosen: the rooms that are played.
+        room_set: the rooms that are played.
 
     Attributes:
         played: these episodes.
@@ -526,9 +530,9 @@ class ModelPolicy(Observer):
         ask: Callable[[Conversation], Awaitable[Answer]],
         progress: Callable[[PlayedEpisode], None] | None = None,
         compares: bool = True,
-        chosen: RoomSet = TEST_ROOMS,
+        room_set: RoomSet = TEST_ROOMS,
     ) -> None:
-        self._compares, self._chosen = compares, chosen
+        self._compares, self._room_set = compares, room_set
         self._seat, self._prompting, self._place, self._ask = seat, prompting, place, ask
         self._progress = progress
         self._rooms: Rooms
@@ -545,7 +549,7 @@ class ModelPolicy(Observer):
         number = int(rooms.numbers[0])
         before = self._conversation if number % self._prompting.trials else None
         path = self._place(number)
-        text = self._seat.begin(rooms, **self._chosen.reset(number))
+        text = self._seat.begin(rooms, **self._room_set.reset(number))
         self._rooms = rooms
         self._conversation = Conversation(self._seat, self._prompting, number, path, text, before)
 
@@ -602,7 +606,7 @@ class Conversation:
         seat: where an episode has begun.
         prompting: how the model plays.
         number: of the test episode.
-        path: of the transcript, a line of JSON for each reply; None where somebody else keeps what `record` returns.
+        path: of the transcript, a line of JSON for each reply; None: the caller keeps what `record` returns.
         text: what is seen at the start.
         before: that of the trial before in the same session, which this one goes on with.
 

@@ -176,7 +176,7 @@ def _evaluated(
     partners = partners_of(seats, scenario, program)
     rooms.check(program)
     play = partial(
-        play_test_set, playing, scenario, loaded, program, episodes, trials, partners, chosen=rooms
+        play_test_set, playing, scenario, loaded, program, episodes, trials, partners, room_set=rooms
     )
     if out is None:
         return play()

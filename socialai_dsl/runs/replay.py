@@ -136,7 +136,7 @@ def _played(
         most = rooms.count // trials * trials
         program, whole = compiled(loaded), min(-(-count // trials) * trials, most)
         partners = partners_of(named, scenario, program)
-        evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners, chosen=rooms)
+        evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners, room_set=rooms)
     _warn(evaluation.warnings)
     if numbers is None:
         return evaluation.traces(evaluation.to_replay(record))

@@ -143,16 +143,20 @@ def _digest(file: Path) -> str:
 
 def _from(scenario: str, out: Path) -> str:
     """A scenario as it is called from the folder of the tables; one that ships is called so everywhere."""
+    base, changes = _split(scenario)
+    return Path(os.path.relpath(base, out)).as_posix() + changes if Path(base).is_file() else scenario
+
+
+def _split(scenario: str) -> tuple[str, str]:
+    """The file or name of a scenario, and its variants and parameters."""
     base = scenario.partition("?")[0].partition("+")[0]
-    if not Path(base).is_file():
-        return scenario
-    return Path(os.path.relpath(base, out)).as_posix() + scenario[len(base) :]
+    return base, scenario[len(base) :]
 
 
 def _block(block: Mapping[str, Any], folder: Path) -> PlayedBlock:
     scenario = block["scenario"]
-    base = scenario.partition("?")[0].partition("+")[0]
+    base, changes = _split(scenario)
     if (folder / base).is_file():
-        scenario = display_name((folder / base).resolve()) + scenario[len(base) :]
+        scenario = display_name((folder / base).resolve()) + changes
     endings = [Ending(**one) for one in block["endings"]]
     return PlayedBlock(**{**block, "scenario": scenario, "endings": endings})

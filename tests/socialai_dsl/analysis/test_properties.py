@@ -7,15 +7,19 @@ import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.check import check_scenario
 from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.guessing import Guess, Guessing
+from socialai_dsl.analysis.knowable import Knowing
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Trial
 from socialai_dsl.analysis.reports import Report, Verdict
+from socialai_dsl.analysis.search import Finding, Search
 from socialai_dsl.cli.main import main
 from socialai_dsl.engine.calls import RoomError
 
@@ -406,3 +410,37 @@ def test_what_no_name_draws_is_needed_as_well(
     report = Trial(loaded, Effort(4)).check(plan, Effort(4))
     assert report.verdict is verdict, report.said
     assert said in report.said
+
+
+def test_searches_of_rooms_that_look_different_are_bounded_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However often two rooms come to look different, and however hard each is."""
+    states, looked_at, inside = 5_000, list[int](), list[bool]()
+    solve, search = Guessing.solve, Search.solve
+
+    def guessing(self: Guessing, *arguments: Any, **more: Any) -> Guess:
+        looked_at.clear()
+        inside.append(True)
+        found = solve(self, *arguments, **more)
+        inside.pop()
+        most.append(sum(looked_at))
+        return found
+
+    def searching(self: Search, *arguments: Any, **more: Any) -> Finding:
+        assert not inside or sum(looked_at) <= 2 * states, "no further search begins"
+        found = search(self, *arguments, **more)
+        if inside:
+            looked_at.append(found.states)
+        return found
+
+    most: list[int] = []
+    monkeypatch.setattr(Guessing, "solve", guessing)
+    monkeypatch.setattr(Search, "solve", searching)
+    file = Path(__file__).parents[3] / "docs" / "cookbook" / "hidden_information.yaml"
+    loaded = socialai_dsl.load(file)
+    assert isinstance(loaded, socialai_dsl.LoadedScenario)
+    trial = Trial(loaded, Effort(24, states=states), loaded)
+    for room in (20, 21):
+        Knowing(trial.rooms, trial.effort, trial.scripted).look_at(room)
+    assert max(most) > states, "the bound is reached"
