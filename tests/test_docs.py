@@ -46,7 +46,7 @@ FINDINGS = ROOT / "docs" / "diagnostics"  # their commands and files are wrong o
 REFERENCE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-LINK = re.compile(r"\]\((?!https?://|#)([^)\s]+)\)")
+LINK = re.compile(r"\]\((?!https?://)([^)\s]+)\)")
 
 
 def blocks(path: Path, language: str) -> Iterator[str]:
