@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from socialai_dsl.checking.formats import FORMATS, CheckedInput, as_junit
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import json_text, shows_color
-from socialai_dsl.diagnostics import ScenarioError, counted, printable, render_text
+from socialai_dsl.diagnostics import ScenarioError, counted, is_usage, printable, render_text
 
 if TYPE_CHECKING:
     from socialai_dsl.evaluation.scenario_tests import PlayedTest
@@ -55,15 +55,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
-    """Play the tests that were named; one that fails is a finding, one with a mistake cannot be played."""
+    """Play the tests that were named; a mistake in their files is a finding, and so is a test that fails."""
     from socialai_dsl.evaluation.scenario_tests import play_tests
 
     is_text = arguments.format == "text"
     try:
         played = play_tests(arguments.paths, arguments.chosen, _print if is_text else lambda _: None)
     except ScenarioError as error:
-        print(render_text(error.diagnostics, error.sources, shows_color(sys.stderr)), file=sys.stderr)
-        return Exit.USAGE
+        if is_text or arguments.format == "json":
+            raise
+        # What reads these formats shows findings at their places; standard error it does not read.
+        print(_REPORTS[arguments.format]([CheckedInput(" ".join(arguments.paths), error.diagnostics, error.sources)]))
+        return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if is_text:
         print(_summary(played))
     elif arguments.format == "json":

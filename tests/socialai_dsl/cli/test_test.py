@@ -178,11 +178,18 @@ def test_tests_are_chosen_by_name(capsys: Capture) -> None:
         assert capsys.readouterr().err.startswith("socialai: ")
 
 
-def test_mistakes_end_with_2_and_nothing_is_played(capsys: Capture) -> None:
+def test_mistakes_are_findings_in_every_format_and_nothing_is_played(capsys: Capture) -> None:
     Path("lodge.tests.yaml").write_text(test_with("    play: [{do: Helo there}]\n    ends: outt\n"))
-    assert main(["test", "lodge.yaml"]) == 2
-    said = capsys.readouterr()
-    assert (said.out, said.err.count("S401"), said.err.count("S201")) == ("", 1, 1)
+    for chosen, in_report in ((["text"], False), (["sarif"], True), (["github"], True), (["junit"], True)):
+        assert main(["test", "lodge.yaml", "--format", *chosen]) == 1
+        said = capsys.readouterr()
+        report, empty = (said.out, said.err) if in_report else (said.err, said.out)
+        assert "S401" in report, report
+        assert "S201" in report, report
+        assert empty == ""
+
+
+def test_wrong_usage_ends_with_2() -> None:
     assert main(["test", "nonesuch"]) == 2
     assert main(["test", "talkitout_oracle"]) == 2  # it has none
 
