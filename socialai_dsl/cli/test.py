@@ -65,7 +65,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
         if is_text or arguments.format == "json":
             raise
         # What reads these formats shows findings at their places; standard error it does not read.
-        print(_REPORTS[arguments.format]([CheckedInput(" ".join(arguments.paths), error.diagnostics, error.sources)]))
+        print(
+            _REPORTS[arguments.format](
+                [CheckedInput(" ".join(arguments.paths), error.diagnostics, error.sources)]
+            )
+        )
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if is_text:
         print(_summary(played))

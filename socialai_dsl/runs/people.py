@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -202,7 +203,7 @@ class _Beside:
 
     def others(self, row: Row) -> str:
         """Who had the other seats of an episode, in words."""
-        pairs = (one.partition("=") for one in row["others"].split())
+        pairs = (one.partition("=") for one in shlex.split(row["others"]))
         return ", ".join(f"{seat} by {_A_PERSON if who in self._ids else who}" for seat, _, who in pairs)
 
 

@@ -32,7 +32,7 @@ _OWN: Final[dict[str, dict[str, str]]] = {
         "trial": "episode in the block or round, from 1",
         "room": "number in the test set, or in practice the seed",
         "seat": "that the participant has",
-        "others": "who has the other seats, as seat=who",
+        "others": "who has the other seats, as seat=who; quoted as in a shell where a path has a blank",
         "steps": "steps of the episode",
         "own_steps": "steps that the participant chose",
         "stood_in": "acts that somebody else chose for another participant of the game",

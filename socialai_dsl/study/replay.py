@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -267,7 +268,7 @@ class _Tables:
                     "trial": event["episode"] + 1,
                     "room": game.episode.room if game.episode is not None else "",
                     "seat": seat,
-                    "others": " ".join(others),
+                    "others": shlex.join(others),
                     "steps": episode.t,
                     "own_steps": going.chosen[seat],
                     "stood_in": sum(

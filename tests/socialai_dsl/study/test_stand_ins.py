@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import random
+import shlex
+import shutil
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from socialai_dsl.study.live import Live
 from socialai_dsl.study.log import FILE, read_log
 from socialai_dsl.study.players import agent_of
 from socialai_dsl.study.replay import study_data
+from socialai_dsl.trainer.shipped import agents_folder
 from tests.socialai_dsl.llm.endpoint import Stub, endpoint
 from tests.socialai_dsl.study.participants import Clock, Taking, loaded_study, newcomer, run
 
@@ -211,6 +214,26 @@ def test_a_rival_has_the_agents_seat_from_the_start(place: Path, tmp_path: Path)
     assert len(moves) > 1, "it does something"
     (row,) = study_data(loaded, tmp_path).tables["episodes"]
     assert row["others"] == "agent=rival:hurries"
+
+
+def test_the_column_of_the_others_names_an_agent_in_a_folder_with_a_blank(tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="a trained agent needs PyTorch")
+    shutil.copytree(agents_folder() / "help_as_helper", tmp_path / "two agents" / "jill")
+    loaded = loaded_study(
+        BESIDE.replace("llm:stub", "two agents/jill").replace("episodes: 2", "episodes: 1"), tmp_path
+    )
+
+    async def play() -> None:
+        live = Live(loaded, tmp_path)
+        one = await newcomer(live)
+        await one.go()
+        while not one.now.get("ended"):
+            await one.act("left")
+        await live.close()
+
+    run(play)
+    tables = study_data(loaded, tmp_path).tables
+    assert shlex.split(tables["episodes"][0]["others"]) == ["jill=two agents/jill"]
 
 
 # -- language models -----------------------------------------------------------------------------------------------
