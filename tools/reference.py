@@ -38,8 +38,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
 _INTRODUCTION: Final = """\
 # Reference
 
-Every key and every word of the language, as `make reference` takes them from the engine itself. What they are
-for, and how they work together, is explained in [The scenario language](language.md).
+Every key and every word of the language. `make reference` takes this page from the engine itself. [The scenario
+language](language.md) explains how keys and words work together.
 
 """
 
@@ -150,7 +150,7 @@ def _value(annotation: Any, around: Sequence[Any] = ()) -> str:
         return " or ".join([value, *(_value(part) for part in parts if part not in scalars)])
     if annotation in _SCALARS:
         return _SCALARS[annotation] + _bounds(around)
-    return " or ".join(dict.fromkeys(_value(part, around) for part in parts))
+    return " or ".join(dict.fromkeys(_value(part, around) for part in parts)) or "a value"
 
 
 def _named(held: "Holds | None") -> str:
@@ -231,9 +231,9 @@ def _words() -> Iterator[str]:
 
     yield "## Words\n"
     yield (
-        "`a` is anybody or anything in the room, `n` a member of the cast, `o` an object, `x` one of them, a cell or\n"
-        "a group, of which any one suffices. In a frame what stands before the dot may be left out, and is then the\n"
-        "NPC itself.\n"
+        "`a` is a member of the cast or an object, `n` a member, `o` an object, `x` one of them, a cell or a group, any\n"
+        "member of which suffices. \"It\" is what stands before the dot; in a frame that may be left out, and is then the\n"
+        "member that follows the frame. [Expressions](language.md#expressions) has the rules for all of them.\n"
     )
     yield "### Conditions and values\n"
     yield "| word | gives | meaning |\n|---|---|---|"
@@ -251,10 +251,19 @@ def _words() -> Iterator[str]:
         yield ""
 
 
+_NAMED_ARGUMENTS: Final = {
+    "rect": ["x0", "y0", "x1", "y1"],
+    "column": ["x"],
+    "row": ["y"],
+    "each_wall": ["margin"],
+}  # fmt: skip
+"""Word -> its arguments, where their kinds would not tell them apart."""
+
+
 def _written(signature: "Signature") -> str:
     takes = [_ARGUMENTS[kind] for kind in signature.takes]
-    if signature.name in ("rect",):
-        takes = ["x0", "y0", "x1", "y1"]
+    if signature.name in _NAMED_ARGUMENTS:
+        takes = _NAMED_ARGUMENTS[signature.name]
     elif len(takes) == 2 and takes[0] == takes[1]:
         takes = [takes[0], takes[0].replace("n", "m").replace("x", "y")]
     elif signature.name == "nearest":

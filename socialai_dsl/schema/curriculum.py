@@ -59,7 +59,7 @@ class Until(Model):
 class Phase(Model):
     """The members of a phase, and its end; the last phase never ends."""
 
-    name: Prose | None = Field(None, description="a few words for people")
+    name: Prose | None = Field(None, description="a few words for readers of the file")
     play: Annotated[ListOf[Group], Field(min_length=1)] | None = Field(
         None, description="groups of members; default all"
     )
@@ -75,5 +75,5 @@ class Curriculum(Model):
     """The members of a suite that are played in training, phase by phase."""
 
     curriculum: Word = Field(description="the name of the curriculum")
-    about: Prose | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
     phases: Annotated[ListOf[Phase], Field(min_length=1)] = Field(description="one after another")

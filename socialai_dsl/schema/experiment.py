@@ -181,7 +181,7 @@ class Settings(_RunOptions):
         None,
         description="the way of learning; guided: the scenario's script shows the task first; default plain",
     )
-    hyper: Hyper | None = Field(None, description="any other option of the trainer")
+    hyper: Hyper | None = Field(None, description="name: value of any other option of the trainer")
 
 
 def one_setting(name: str, value: str | int) -> Settings | str:
@@ -252,7 +252,7 @@ OverrideList = Annotated[ListOf[Override], Field(max_length=1000)]
 class Profile(Model):
     """A size in which the experiment can be run; it overrides everything else in the file."""
 
-    about: Prose | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
     set: Settings | None = Field(None, description="settings of all conditions of the file")
     overrides: OverrideList = Field((), description="other settings for some of them; later ones win")
     conditions: ConditionList = Field(
@@ -264,8 +264,8 @@ class Experiment(Model):
     """An experiment: agents on scenarios, each with its seeds."""
 
     experiment: Word = Field(description="the name of the experiment, and of its folder")
-    about: Prose | None = Field(None, description="one sentence for people")
-    notes: Prose | None = Field(None, description="more for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
+    notes: Prose | None = Field(None, description="more for readers of the file")
     set: Settings | None = Field(None, description="settings of all conditions, which each may override")
     conditions: Annotated[ConditionList, Field(min_length=1)] = Field(
         description="conditions and grids of them"

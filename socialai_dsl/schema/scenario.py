@@ -186,13 +186,17 @@ class Effects(Model):
     """What a rule or a step does, in the order of `DOES`."""
 
     set: dict[Target, Expression] = Field(
-        default_factory=dict, description="registers of the frame's `let`", examples=[{"trust(speaker)": 5}]
+        default_factory=dict,
+        description="registers of the frame or the world, or looks: their new values",
+        examples=[{"trust(speaker)": 5}],
     )
-    cause: Effect = Field((), description="effects on objects and on oneself, in order")
+    cause: Effect = Field((), description="an effect, or several in this order")
     say: TextLine | None = Field(
-        None, description="a text to say; <...> puts a value in", examples=["The <exit.color> door"]
+        None, description="the text that is said; <...> is a value", examples=["The <exit.color> door"]
     )
-    to: Expression | None = Field(None, description="the member who is addressed", examples=["speaker"])
+    to: Expression | None = Field(
+        None, description="the member of the cast whom `say` addresses", examples=["speaker"]
+    )
 
 
 MemberName = Annotated[
@@ -218,35 +222,44 @@ class Rule(Effects):
 
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
     hears: Annotated[Texts, Holds("utterance")] = Field(
-        (), description="an utterance, or a list of alternatives"
+        (), description="an utterance, or a list of alternatives; `<noun>` is any noun, `any` any utterance"
     )
-    addressed: bool | None = Field(None, description="of `hears`: only what is said to it, or only the rest")
+    addressed: bool | None = Field(
+        None, description="of `hears`: `true`: only what is said to this member; `false`: only the rest"
+    )
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
     after: Annotated[Expression | None, Hides(False), Means("turns_in_state >= after")] = Field(
-        None, description="holds from this turn in the state on"
+        None, description="at least so many activities of this state have run"
     )
     before: Annotated[Expression | None, Hides(False), Means("turns_in_state < before")] = Field(
-        None, description="holds before this turn in the state, and no longer"
+        None, description="fewer activities of this state than that have run"
     )
-    chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
-    once: bool = Field(False, description="once per episode and NPC")
+    chance: Probability | None = Field(
+        None, description="a probability, drawn in each turn in which all other conditions hold"
+    )
+    once: bool = Field(False, description="fires once per episode and member")
 
 
 _PerCent = Annotated[int, Field(ge=-100, le=100)]
 
 
 class WorldRule(Model):
-    """A rule about the world, read once a step after all turns; each that holds takes effect."""
+    """A rule of the world, read once per step after all turns; each that holds takes effect."""
 
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
-    chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
-    once: bool = Field(False, description="once per episode")
-    set: dict[Target, Expression] = Field(default_factory=dict, description="registers of `state`")
-    cause: Effect = Field((), description="effects on objects and NPCs, in order")
+    chance: Probability | None = Field(
+        None, description="a probability, drawn in each step in which `when` holds"
+    )
+    once: bool = Field(False, description="takes effect once per episode")
+    set: dict[Target, Expression] = Field(
+        default_factory=dict, description="registers of the world, or looks: their new values"
+    )
+    cause: Effect = Field((), description="an effect, or several in this order")
     reward: _PerCent | dict[MemberName, _PerCent] = Field(
         0,
-        description="per cent of the success reward, added to the reward of the step; or for each seat, by member",
+        description="per cent of the success reward, added to the reward of the step; or for each "
+        "seat, by member",
         examples=[{"agent": 5, "helper": -5}],
     )
 
@@ -254,9 +267,12 @@ class WorldRule(Model):
 class ThenRule(Rule):
     """A rule read after the body action."""
 
-    goto: StateName | None = Field(None, description="the state from the next step on")
+    goto: StateName | None = Field(
+        None,
+        description="the state to enter: in `first` at once, in `then` or beside `do` from the next turn on",
+    )
     goto_now: StateName | None = Field(
-        None, description="the state from now on: its `then` is still read in this step"
+        None, description="the state to enter at once: its `then` is still read in this turn"
     )
 
 
@@ -269,14 +285,14 @@ class FirstRule(ThenRule):
 
 
 class State(Model):
-    """One state of a frame: what is noticed before moving, one body action, what is noticed after it."""
+    """A state of a frame: in each turn, rules before the body action, the body action, rules after it."""
 
     first: ListOf[FirstRule] = Field(
-        (), description="rules read before moving; the first that holds takes effect"
+        (), description="rules read before the body action; the first that holds fires"
     )
-    do: Activity | None = Field(None, description="an activity; default stay", examples=["face(agent)"])
+    do: Activity | None = Field(None, description="an activity; default `stay`", examples=["face(agent)"])
     then: ListOf[ThenRule] = Field(
-        (), description="rules read after moving; the first that holds takes effect"
+        (), description="rules read after the body action; the first that holds fires"
     )
 
     @property
@@ -288,18 +304,26 @@ class State(Model):
 class Step(Effects):
     """One entry of `steps`: an activity until it is finished, then its effects."""
 
-    state: StateName | None = Field(None, description="a name for npc.is(name)")
-    do: Activity | None = Field(
-        None, description="an activity, until it is finished", examples=["go_to(exit)"]
+    state: StateName | None = Field(
+        None, description="the entry's name, for `npc.is(name)`; default `step0`, `step1`, ..."
     )
-    until: Expression | None = Field(None, description="a condition that finishes the step")
-    for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
+    do: Activity | None = Field(
+        None, description="an activity, until it is finished; default `stay`", examples=["go_to(exit)"]
+    )
+    until: Expression | None = Field(None, description="a condition that ends the entry")
+    for_: Expression | None = Field(
+        None, alias="for", description="the number of turns after which the entry ends, or `ever`"
+    )
     when: Expression | None = Field(
-        None, description="a condition; while it is false at the entry's turn, the entry is left out"
+        None,
+        description="a condition; if it is false at the start of the entry's first turn, the entry is "
+        "left out",
     )
     steps: ListOf[Step] | None = Field(None, description="nested entries, in place of an activity")
     repeat: Expression | None = Field(
-        None, description="how often the nested `steps` are done, at most", examples=[3]
+        None,
+        description="the number of rounds of the nested `steps`, with `while` or `until` at most",
+        examples=[3],
     )
     while_: Expression | None = Field(
         None, alias="while", description="a condition for one more round of the nested `steps`"
@@ -315,31 +339,33 @@ def _entries(steps: tuple[Step, ...], path: DataPath) -> Iterator[tuple[DataPath
 
 
 class Register(Model):
-    """A register with a range to which its values are clipped, or one for each of a group."""
+    """A register with a range to which its values are clipped, or a register for each member of a group."""
 
-    start: Expression = Field(description="its value at first; `none`: nothing yet")
+    start: Expression = Field(description="the initial value; `none`: empty")
     range: Interval | None = Field(
         None, description="a..b, to which its values are clipped", examples=["0..10"]
     )
     for_: Expression | None = Field(
-        None, alias="for", description="a group: one register for each of it", examples=["peers"]
+        None, alias="for", description="a group: a register for each of its members", examples=["peers"]
     )
 
 
 class Look(Model):
-    """An attribute that is seen, of each of a group, and may change."""
+    """An attribute of each of a group that is seen, and may change."""
 
     for_: Expression = Field(
         alias="for", description="a group: objects, or members of the cast", examples=["balls"]
     )
     words: Annotated[ListOf[Word], Hides(True)] = Field(
-        min_length=2, max_length=8, description="its values", examples=[["small", "large"]]
+        min_length=2, max_length=8, description="the words, two to eight", examples=[["small", "large"]]
     )
     start: Expressions = Field(
-        ("random",), description="its value at first, or a list with one for each; default random"
+        ("random",),
+        description="the initial word: an expression in which `it` is each of the group, or a list "
+        "with one each; default `random`",
     )
     ordered: Annotated[bool, Hides(True)] = Field(
-        False, description="its values go from the least to the greatest: `a.size < b.size` compares them"
+        False, description="the words go from the least to the greatest: `a.size < b.size` compares them"
     )
 
 
@@ -348,17 +374,16 @@ class Frame(Model):
 
     slots: dict[Word, SlotType] = Field(
         default_factory=dict,
-        description="name: type of what varies; members of the cast fill it by `with`",
+        description="name: type of a value that members of the cast give by `with`",
         examples=[{"lesson": "object"}],
     )
     let: dict[Word, Expression | Register] = Field(
-        default_factory=dict, description="registers, one copy per NPC"
+        default_factory=dict,
+        description="name: the initial value of a register, one for each member that follows the frame",
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
-    start: StateName | None = Field(None, description="the first state; default the first written")
-    states: dict[Word, State] | None = Field(
-        None, description="name: what is noticed and done in this state of the interaction"
-    )
+    start: StateName | None = Field(None, description="the first state; default: the first in the file")
+    states: dict[Word, State] | None = Field(None, description="name: a state of the interaction")
     steps: ListOf[Step] | None = Field(
         None, description="in place of states: activities in a row, each until it is finished"
     )
@@ -387,39 +412,46 @@ class Role(Model):
 
 
 class Source(Model):
-    """A source of a belief: something seen, or told."""
+    """A source of a belief: something that the member sees, or hears."""
 
-    of: Expression = Field(description="what is believed then")
+    of: Expression = Field(description="the value that the belief takes")
     when: Expression | None = Field(None, description="a condition", examples=["sees(toy)"])
     hears: Annotated[Texts, Holds("utterance")] = Field(
-        (), description="an utterance, or a list of alternatives"
+        (), description="an utterance, or a list of alternatives; `<noun>` is any noun, `any` any utterance"
     )
 
 
 class Belief(Model):
     """A belief of a member of the cast: its latest observation of a value."""
 
-    of: Expression | None = Field(None, description="the value that it is about, such as toy.inside")
-    when: Expression | None = Field(None, description="the condition of an observation; default always")
+    of: Expression | None = Field(None, description="the value that it is about")
+    when: Expression | None = Field(
+        None, description="a condition: the belief takes the value while it holds; default: always"
+    )
     start: Expression | None = Field(
-        None, description="its value at first; default: the true one; `none`: nothing yet"
+        None, description="the initial value; default: the true one; `none`: empty"
     )
     from_: ListOf[Source] = Field(
         (),
         alias="from",
-        description="in place of `of`: its sources, of which the first that holds in a turn counts",
+        description="in place of `of` and `when`: sources, read in this order each turn; the first "
+        "that holds counts",
     )
     forget: Expression | None = Field(
-        None, description="number of turns without a source, or a condition, after which it holds nothing"
+        None,
+        description="the number of turns without a source after which the belief is empty, or a "
+        "condition that empties it; default: never",
     )
 
 
 class Character(Model):
     """An inhabitant of the room: its appearance, place and behaviour."""
 
-    kind: Annotated[Word, Holds("spelt")] | None = Field(None, description="its appearance; default peer")
+    kind: Annotated[Word, Holds("spelt")] | None = Field(
+        None, description="a word for its appearance; default `peer`"
+    )
     name: SpeakerName | None = Field(
-        None, description="the speaker's name before its lines; default its key, capitalised"
+        None, description="the speaker's name before its lines; default: its key, capitalised"
     )
     color: Annotated[Expression | None, Hides(False)] = Field(None, description="default random")
     place: Place | None = Field(None, description="default anywhere")
@@ -429,28 +461,43 @@ class Character(Model):
     facing: Annotated[Expression | None, Hides(False)] = Field(
         None, description="a direction, random, or toward(x); default random"
     )
-    view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
-    earshot: Earshot | None = Field(None, description="the reach of its voice")
-    frame: FrameName | None = Field(None, description="the frame it follows; default none: it stays")
-    with_: dict[Annotated[Word, Holds("name", ("slots",))], ExpressionOrText] = Field(
-        default_factory=dict, alias="with", description="fills the slots"
+    view: int | None = Field(
+        None, ge=1, le=15, description="side of the square that it sees, in cells; default 7"
     )
-    beliefs: dict[Word, Belief] = Field(default_factory=dict, description="name: a belief")
+    earshot: Earshot | None = Field(
+        None, description="the reach of its own voice; it never limits what it hears; default: the scenario's"
+    )
+    frame: FrameName | None = Field(None, description="the frame that it follows; default: none, it stays")
+    with_: dict[Annotated[Word, Holds("name", ("slots",))], ExpressionOrText] = Field(
+        default_factory=dict, alias="with", description="slot of the frame: its value"
+    )
+    beliefs: dict[Word, Belief] = Field(
+        default_factory=dict, description="name: a belief about a value, `npc.believes.name`"
+    )
     accepts: Expression | None = Field(
-        None, description="whether it takes what is given to it; default always", examples=["is(waiting)"]
+        None,
+        description="a condition: while it holds, the member takes what it is given; default: always",
+        examples=["is(waiting)"],
     )
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     pushed_by: Literal["anybody"] | None = Field(
-        None, description="who walks into it moves it one cell the same way, and stays; default nobody can"
+        None,
+        description="whoever walks into it moves it one cell the same way, and stays; default: nobody can",
     )
-    kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
+    kind_code: int | None = Field(
+        None,
+        ge=0,
+        le=255,
+        description="its number in the status channel of the image; default: by the order in which kinds "
+        "appear",
+    )
 
 
 class NpcDefaults(Character):
-    """What all NPCs have whose own keys say nothing else."""
+    """Keys of all NPCs; a member's own keys override them."""
 
     seat: Literal["open"] | None = Field(
-        None, description="open: a player outside of the file can play it; the agent always has a seat"
+        None, description="`open`: a player outside of the file can play it; the agent always has a seat"
     )
 
 
@@ -459,8 +506,8 @@ class Npc(Character):
 
     npc: Word = Field(description="the name of this file's NPC")
     abstract: bool = Field(False, description="a base for `extends` only; no member can be it")
-    about: Prose | None = Field(None, description="one sentence for people")
-    notes: Prose | None = Field(None, description="more for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
+    notes: Prose | None = Field(None, description="more for readers of the file")
     frames: dict[Word, Frame] = Field(default_factory=dict, description="the frames it brings along")
 
 
@@ -469,14 +516,14 @@ class CastMember(NpcDefaults):
     then from the defaults of the language.
     """
 
-    role: RoleName | None = Field(None, description="the part it plays")
+    role: RoleName | None = Field(None, description="the role that it plays")
     one_of: Annotated[
         tuple[Npc, ...] | None,
         BeforeValidator(_as_tuple),
         as_written(str | list[str]),
         Holds("file"),
     ] = Field(
-        None, description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *"
+        None, description="npc files, one of which is drawn for each episode: a list, or a pattern with `*`"
     )
 
 
@@ -523,64 +570,95 @@ class WrittenCast(Model):
 
 
 class Room(Model):
-    """A walled rectangle; sizes count the walls. Width and height are drawn independently from `size`."""
+    """A walled rectangle: `size`, or `width` and `height`."""
 
-    size: Interval | None = Field(None, description="n, or a..b: both width and height", examples=["5..8", 8])
+    size: Interval | None = Field(
+        None,
+        description="n, or a..b: width and height in cells, walls included, 3 to 30; each is drawn by itself",
+        examples=["5..8", 8],
+    )
     width: Interval | None = Field(None, description="width in cells, walls included")
     height: Interval | None = Field(None, description="height in cells, walls included")
     build: ListOf[dict[TypeName, Place]] = Field(
         (),
-        description="fixed things in place of floor, as {type: place}",
+        description="list of {type: place}: fixed things on all cells of the place, in place of "
+        "floor; the size of the room alone decides them",
         examples=[[{"lava": "column(W // 2)"}]],
     )
     occlusion: bool = Field(False, description="opaque things hide the cells behind them")
     canvas: Annotated[ListOf[int], Field(min_length=2, max_length=2)] | None = Field(
-        None, description="[width, height] of the grid the room lies on; default the largest room"
+        None, description="[width, height] of the grid on which the room lies; default: the largest room"
     )
 
 
 class ObjectGroup(Model):
     """An object, or with `count` (or a list in `at`) a group of them."""
 
-    type: TypeName = Field(description="an object type of the prelude", examples=["door"])
-    count: Annotated[int | None, Hides(True)] = Field(None, ge=1, le=16, description="the size of the group")
-    place: Places | None = Field(None, description="where it is drawn; a list gives one each")
+    type: TypeName = Field(description="an object type", examples=["door"])
+    count: Annotated[int | None, Hides(True)] = Field(
+        None, ge=1, le=16, description="makes a group of this size"
+    )
+    place: Places | None = Field(
+        None, description="where it is put; a list has a place for each of the group; default `anywhere`"
+    )
     at: (
         Annotated[
             tuple[Expression, ...] | tuple[tuple[Expression, ...], ...],
             BeforeValidator(lambda v: tuple(_as_tuple(item) for item in v) if isinstance(v, list) else v),
         ]
         | None
-    ) = Field(None, description="[x, y], or a list of them: a group")
+    ) = Field(None, description="[x, y] in place of `place`; a list of them makes a group")
     color: Annotated[Expressions | None, Hides(False)] = Field(
-        None, description="a colour, `random`, `distinct`, or one each"
+        None,
+        description="a colour, `random`, `distinct` (no two of the group alike), a list with one "
+        "each, `others.color` (of each its counterpart) or `permuted(others.color)` (the "
+        "same in a drawn order); default: the type's",
     )
-    state: StateName | None = Field(None, description="initial status; default the type's")
-    pressed: Expression | None = Field(None, description="whether it is pressed at first")
-    opened: Expression | None = Field(None, description="whether it is opened at first")
-    locked: Expression | None = Field(None, description="computed: it is locked while this holds")
-    tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
+    state: StateName | None = Field(None, description="the initial status; default: the type's")
+    pressed: Expression | None = Field(
+        None, description="a condition at reset: if it holds, the initial status is `pressed`"
+    )
+    opened: Expression | None = Field(
+        None, description="a condition at reset: if it holds, the initial status is `opened`"
+    )
+    locked: Expression | None = Field(None, description="a condition: the object is `locked` while it holds")
+    tagged: Expression | None = Field(None, description="a condition: the object is `tagged` while it holds")
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
-    dark: bool = Field(False, description="the agent sees no difference between its statuses")
+    dark: bool = Field(False, description="the agent sees every status as the type's initial one")
     carryable: Annotated[bool, Hides(True)] = Field(
-        False, description="it can be picked up, carried and given"
+        False, description="members of the cast can pick it up, carry and give it"
     )
     inside: Annotated[str, Holds("name", ("objects", "cast"))] | None = Field(
-        None, description="the object it lies in, unseen until that is opened, or who carries it at first"
+        None,
+        description="the object that it lies in until that is opened, or the member that carries it, "
+        "initially",
     )
     exclusive: bool = Field(
-        False, description="of a group: once one of them is used, the others react to nothing"
+        False,
+        description="of a group: while one of them is not in its initial status, the others react to "
+        "no toggle and no push",
     )
-    overlap: bool = Field(False, description="it may be put on a cell that is taken")
+    overlap: bool = Field(
+        False,
+        description="`place` may draw a cell that is taken, in a column, row or rect also one that the "
+        "room builds on; `at` always may",
+    )
     timer: int | None = Field(
-        None, ge=1, le=10_000, description="steps after which its active status expires"
+        None,
+        ge=1,
+        le=10_000,
+        description="the number of steps after which its active status expires; default: never",
     )
     opens: ObjectName | None = Field(
-        None, description="the object that is open while this is active, or a group in the same order"
+        None,
+        description="the objects that are open exactly while this is active: a name, a group or `a | "
+        "b`; of two groups the first opens the first, and so on",
     )
-    pushed_by: TypeName | None = Field(None, description="the only type of object that can push it")
+    pushed_by: TypeName | None = Field(
+        None, description="the type of object that alone can push it; default: bodies, and objects that roll"
+    )
     unlocks: ObjectName | None = Field(
-        None, description="the object that is unlocked while this is pressed, or a group in the same order"
+        None, description="the objects that this unlocks for good when it is pressed, written like `opens`"
     )
 
 
@@ -591,33 +669,43 @@ CHANNELS: tuple[Channel, ...] = get_args(Channel)
 
 
 class Observe(Model):
-    """The agent's perception; it changes nothing else."""
+    """The agent's perception."""
 
     npcs: Literal["shown", "hidden"] = Field(
-        "shown", description="hidden: NPCs are neither seen nor heard nor in the way"
+        "shown",
+        description="`hidden`: the agent neither sees nor hears NPCs, and walks through them; they go "
+        "on acting, and can be poked",
     )
-    image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
-    names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
+    image: Literal["end", "before_npcs"] = Field(
+        "end", description="the moment of the image: the `end` of the step, or `before_npcs`"
+    )
+    names: Literal["shown", "hidden"] = Field(
+        "shown", description="`hidden`: the agent hears lines without the speaker's name"
+    )
     lines: Literal["plain", "marked"] = Field(
         "plain",
-        description="marked: each line in `tokens` begins with a mark of who says it, `<Ann>`, which is no word",
+        description="`marked`: each line in `tokens` begins with a token of its own for the speaker, `<Ann>`",
     )
     own_voice: bool = Field(False, description="whether the agent hears itself")
     seats: Literal["shown", "hidden"] = Field(
         "shown",
-        description="of several: whether its own cell in the image tells a player which seat it has",
+        description="of several seats: `hidden`: neither the own cell in the image nor the text for "
+        "language models tells a player its seat",
     )
     channels: ListOf[Channel | LookName] | None = Field(
         None,
-        description="the first 4, 6 or 8, carrying, looks; default: 4, carrying where something can be carried, looks",
+        description="the channels of the image: the first 4, 6 or 8 of these, then `carrying`, then "
+        "looks in the order of the file; default: the first 4, `carrying` where NPCs can "
+        "carry something, all looks",
         examples=[["type", "color", "status", "orientation", "carrying"]],
     )
     tone: LookName | None = Field(
-        None, description="a look of NPCs, whose word is heard before what they say: `(angry) Great idea.`"
+        None, description="a look of NPCs: its word is heard before what they say: `Ann: (angry) No`"
     )
     directions: Literal["absolute", "egocentric"] = Field(
         "absolute",
-        description="how the image shows the directions of NPCs; egocentric: as seen from the agent",
+        description="the directions of NPCs in the image: `absolute`, or `egocentric`, as seen from "
+        "the agent",
     )
 
 
@@ -635,25 +723,26 @@ class UtteranceGrammar(Model):
     templates: ListOf[TextLine] = Field(
         min_length=1,
         max_length=64,
-        description="texts; <noun> stands for each noun, <slot> for all that a slot can be",
+        description="texts; `<noun>` stands for each noun, `<slot>` for each value of a slot",
         examples=[["Where is <noun>"]],
     )
     nouns: ListOf[_Filler] = Field(
         (),
         min_length=1,
         max_length=256,
-        description="the values of <noun>; templates without slots need none",
+        description="the values of `<noun>`, words or numbers",
         examples=[["the exit", "the wall"]],
     )
     slots: dict[Word, Fillers] = Field(
         default_factory=dict,
         max_length=8,
-        description="in place of `nouns`, name: the values of <name>: words, things, members, `colors`, 1..6",
+        description="in place of `nouns`; name: the values of `<name>`: words, objects, members of the "
+        "cast, `colors`, 1..6",
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
     )
     to: Annotated[SlotMark | None, Hides(True)] = Field(
         None,
-        description="the slot whose member of the cast is addressed by what is said",
+        description="the slot, as `<whom>`, whose value the agent addresses",
         examples=["<whom>"],
     )
 
@@ -675,8 +764,8 @@ LetNames = Annotated[
 class OnlyThrough(Model):
     """A draw that only these members reveal."""
 
-    draw: LetName = Field(description="a `let` whose values are tried against each other")
-    by: Names = Field(description="members of the cast whose cues may reveal it")
+    draw: LetName = Field(description="a `let` that nothing else may reveal")
+    by: Names = Field(description="the members of the cast whose cues may reveal it")
 
 
 class Dilemma(Model):
@@ -691,28 +780,33 @@ class Property(Model):
     `knowable` and `dilemma`.
     """
 
-    reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
-    never: Expression | None = Field(None, description="a condition, or the name of an outcome")
+    reachable: Expression | None = Field(
+        None, description="a condition, or an outcome's name, that the agent can make true in some room"
+    )
+    never: Expression | None = Field(
+        None, description="a condition, or an outcome's name, that no agent can make true in any room"
+    )
     within: Annotated[int | None, Hides(True)] = Field(
-        None, ge=1, le=10_000, description="steps of a shortest success"
+        None, ge=1, le=10_000, description="the number of steps in which the agent can succeed in every room"
     )
     oracle: Annotated[Probability | None, Hides(True)] = Field(
-        None, description="share of rooms that the variant `oracle` solves"
+        None, description="the least share of rooms that the scenario's script solves"
     )
     script: Annotated[Literal["perceives"] | None, Hides(True)] = Field(
-        None, description="the variant `oracle` acts on its perceptions alone"
+        None, description="`perceives`: the scenario's script acts on its perceptions alone"
     )
     rival: Annotated[Word, Holds("name", ("rivals",))] | None = Field(
-        None, description="a strategy of `rivals`, which must not succeed too often"
+        None, description="a strategy of `rivals` that solves no more rooms than `at_most`"
     )
     at_most: Annotated[Probability | None, Hides(True)] = Field(
-        None, description="for `rival`: the share of rooms that it may solve at most"
+        None, description="for `rival`: the largest share of rooms that it may solve"
     )
     needs: Names | None = Field(None, description="members without which an agent can only guess")
     only_through: OnlyThrough | None = Field(None, description="members whose cues alone may reveal a draw")
     knowable: Annotated[bool | None, Hides(True)] = Field(
         None,
-        description="whether an agent can perceive in time the draws that its success depends on (tried by default)",
+        description="whether an agent can perceive in time the draws that its success depends on "
+        "(tried by default)",
     )
     dilemma: Dilemma | None = Field(
         None, description="of several seats: each gains by defecting whatever others do, and all lose by it"
@@ -727,15 +821,17 @@ class Probe(Model):
     """A question to a language model about the present moment, whose right answer the engine computes."""
 
     when: Expression | None = Field(
-        None, description="asked at the first moment at which this holds; default: when the episode has ended"
+        None,
+        description="a condition: the probe is asked once, when it first holds; default: when the "
+        "episode has ended",
     )
     ask: TextLine = Field(description="the question; <...> is a value", examples=["Where will Sally look?"])
     answer: Expression = Field(
-        description="the right answer at that moment: a value, or a condition for yes or no",
+        description="the right answer at that moment: a value, or a condition, which means `yes` or `no`",
         examples=["sally.believes.toy_in.color"],
     )
     answers: Texts = Field(
-        (), description="the possible answers; <...> is a value (default: all values of the answer)"
+        (), description="the possible answers; <...> is a value; default: all values of `answer`, up to 64"
     )
 
 
@@ -769,7 +865,8 @@ class DialogueStep(Model):
     )
     hears: Annotated[Texts, Holds("heard")] = Field(
         (),
-        description="all that is heard meanwhile, in order; <...> is a value; `any`: whatever it is; default: nothing",
+        description="all that is heard meanwhile, in order; <...> is a value; `any`: whatever it is; "
+        "default: nothing",
         examples=["Gandalf: I am fine."],
     )
     state: dict[MemberName, StateName] = Field(
@@ -788,7 +885,7 @@ class DialogueStep(Model):
 class DialogueTest(Model):
     """A dialogue that must go as written; `socialai test` plays it."""
 
-    about: Prose | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
     of: Annotated[str, Holds("spelt")] | None = Field(
         None, description="variants and parameters of the scenario that is played", examples=["+unsocial?n=2"]
     )
@@ -798,7 +895,8 @@ class DialogueTest(Model):
     )
     ends: Annotated[str, Holds("ending")] | None = Field(
         None,
-        description="how the last act ends the episode: success, failure, deadly, timeout, an outcome's id, or `open`",
+        description="how the last act ends the episode: success, failure, deadly, timeout, an "
+        "outcome's id, or `open`",
     )
     reward: float | None = Field(
         None, description="what the acts earn together, to three decimals", examples=[0.91]
@@ -830,21 +928,21 @@ class Outcome(Model):
 
 
 class Reward(Model):
-    """The reward: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
+    """The reward of the agent."""
 
     success: Annotated[str, Holds("spelt")] = Field(
-        "linear(0.9)", description="linear(s), the part s that is lost by the horizon"
+        "linear(0.9)", description="linear(s): a success at step t pays 1 - s t / horizon"
     )
     each_step: Annotated[
         float, Field(ge=-1, le=1), BeforeValidator(lambda v: float(v) if type(v) is int else v)
-    ] = Field(0.0, description="added to the reward of every step")
+    ] = Field(0.0, description="a number, -1 to 1, that is added to the reward of every step")
 
 
 class SungWith(Model):
-    """When the elements of a sequence are accompanied by an utterance."""
+    """The utterances of a sequence."""
 
     chance: Probability = Field(
-        description="of an utterance, drawn uniformly from the grammar, for each element"
+        description="the probability that an element has an utterance, drawn uniformly from the grammar"
     )
 
 
@@ -852,17 +950,21 @@ class Sequence(Model):
     """A sequence of acts, drawn at reset: each element has a move and perhaps an utterance."""
 
     sequence: int = Field(ge=1, le=16, description="the number of elements")
-    moves: ListOf[Primitive] = Field(min_length=1, description="the moves to draw from")
-    utterance: SungWith | None = Field(None, description="default: silent")
+    moves: ListOf[Primitive] = Field(min_length=1, description="the moves that are drawn from, all alike")
+    utterance: SungWith | None = Field(
+        None, description="whether elements have an utterance; default: they have none"
+    )
 
 
 class Memory(Model):
     """The agent's last acts, to be compared with a sequence."""
 
     last: int = Field(ge=1, le=16, description="the number of acts that it holds")
-    of: Literal["agent.acts"] = Field("agent.acts", description="moves and utterances of the agent")
+    of: Literal["agent.acts"] = Field(
+        "agent.acts", description="the acts: the agent's body actions and utterances"
+    )
     while_: Expression | None = Field(
-        None, alias="while", description="only steps at whose start this held; default all"
+        None, alias="while", description="a condition: only steps at whose start it holds count; default: all"
     )
 
 
@@ -895,32 +997,39 @@ class Scenario(Model):
 
     scenario: Word = Field(description="the name of the scenario")
     abstract: bool = Field(False, description="a base for `extends` only; it cannot be run itself")
-    about: Prose | None = Field(None, description="one sentence for people")
-    notes: Prose | None = Field(None, description="more for people")
-    skills: ListOf[Prose] = Field((), description="the skills that it needs, for people")
+    about: Prose | None = Field(None, description="its purpose in one sentence; no player is told it")
+    notes: Prose | None = Field(None, description="more for readers of the file; no player is told it")
+    skills: ListOf[Prose] = Field((), description="the skills that it needs; no player is told them")
     instructions: Instructions | None = Field(
         None,
-        description="what players are told before the first observation: a text, or a mapping from languages to texts",
+        description="what players are told before the first observation: a text, or a mapping from "
+        "languages to texts",
         examples=["Reach the exit."],
     )
     training_frames: int | None = Field(
-        None, ge=1, description="how long the recipe guided trains an agent for"
+        None,
+        ge=1,
+        description="the number of frames for which the recipe `guided` trains an agent; default 500000",
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
-    earshot: Earshot = Field("next_to", description="next_to, room, or a Manhattan distance")
-    overheard: bool = Field(True, description="whether others within earshot hear what is said to one")
-    actions: ListOf[Primitive] = Field(
-        PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
+    earshot: Earshot = Field(
+        "next_to", description="the reach of voices: `next_to`, `room`, or a Manhattan distance in cells"
     )
+    overheard: bool = Field(
+        True, description="whether others within earshot hear an utterance that addresses one member"
+    )
+    actions: ListOf[Primitive] = Field(PRIMITIVES, min_length=1, description="the agent's body actions")
     params: dict[Word, PlainValue | Parameter] = Field(
-        default_factory=dict, description="name: default of parameters, used as $name, given as ?name=value"
+        default_factory=dict,
+        description="name: a default, or `default` and `values`; `$name` stands for its value, "
+        "`?name=value` sets it",
     )
     grammar: Annotated[
         UtteranceGrammar, as_written(UtteranceGrammar | Word), Holds("name", ("grammars",))
     ] = Field(description="the agent's utterances: written out, or the name of a shared grammar")
     room: Annotated[Room, Hides(False)] = Field(description="the walled room", examples=[{"size": "5..8"}])
     order: ListOf[Annotated[Word, Holds("name", ("objects", "cast"))]] = Field(
-        (), description="placement order"
+        (), description="names of objects and members that are placed first, in this order"
     )
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
@@ -930,67 +1039,80 @@ class Scenario(Model):
     looks: dict[Word, Look] = Field(
         default_factory=dict,
         max_length=6,
-        description="name: an attribute of things or members of the cast that is seen, and may change",
+        description="name: an attribute of objects or members of the cast that is seen, and may change",
         examples=[{"size": {"for": "balls", "words": ["small", "large"]}}],
     )
     let: dict[Word, Expression | Sequence] = Field(
-        default_factory=dict, description="drawn or computed once per episode"
+        default_factory=dict, description="name: a value that is drawn or computed once, at reset"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
     state: dict[Word, Expression | Register] = Field(
-        default_factory=dict, description="registers of the world, set by rules and by any frame"
+        default_factory=dict,
+        description="name: the initial value of a register of the world, which rules and all frames can set",
     )
     tables: dict[Word, dict[str, ExpressionOrText] | str] = Field(
-        default_factory=dict, description="name: {key: value}, or permuted(table): name(key) looks a value up"
+        default_factory=dict,
+        description="name: {key: value}, or `permuted(table)`; `name(key)` looks a value up",
     )
-    memory: dict[Word, Memory] = Field(default_factory=dict, description="name: the agent's last acts")
+    memory: dict[Word, Memory] = Field(
+        default_factory=dict, description="name: a memory of the agent's last acts"
+    )
     frames: dict[Word, Frame] = Field(
-        default_factory=dict, description="name: protocol of interaction, which members of the cast follow"
+        default_factory=dict, description="name: a protocol of interaction, which members of the cast follow"
     )
-    roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
-    npc_defaults: NpcDefaults = Field(NpcDefaults(), description="keys of all NPCs, which each may override")
+    roles: dict[Word, Role] = Field(
+        default_factory=dict, description="name: a part that a member of the cast plays"
+    )
+    npc_defaults: NpcDefaults = Field(
+        NpcDefaults(), description="keys of all NPCs, which each may override; `with` is merged"
+    )
     cast: Annotated[dict[MemberName, CastMember], as_written(WrittenCast)] = Field(
         description="who is in the room: the `agent` and the NPCs by name",
         examples=[{"guide": {"frame": "show_the_way"}, "agent": {"place": "anywhere"}}],
     )
     rules: ListOf[WorldRule] = Field(
-        (), description="rules about the world, read once a step; each that holds takes effect"
+        (), description="rules of the world, read once per step; each that holds takes effect"
     )
     outcome: Annotated[ListOf[Outcome], Hides(False)] = Field(
-        min_length=1, description="read top to bottom after every step; the first that holds ends the episode"
+        min_length=1,
+        description="conditions that end the episode, read after every step; the first that holds counts",
     )
     reward: Annotated[Reward, Hides(False)] = Field(
         Reward(), description="the reward of a success and of each step"
     )
-    observe: Observe = Field(Observe(), description="the agent's perception")
+    observe: Observe = Field(Observe(), description="the agent's perception; it changes nothing else")
     require: ListOf[Expression] = Field(
-        (), description="conditions on the drawn room, which is drawn again while one is false"
+        (), description="conditions on the drawn room, which is drawn again while one of them is false"
     )
     check: ListOf[Property] = Field(
-        (), description="properties that `socialai check` verifies; playing never reads them"
+        (), description="claims that `socialai check` tries; play never reads them"
     )
     rivals: dict[Word, Frame] = Field(
         default_factory=dict,
         max_length=16,
-        description="name: a strategy that lacks the skill, as a frame for the agent; `SCENARIO+name` plays it",
+        description="name: a strategy that lacks the skill, as a frame for the agent; `SCENARIO+name` "
+        "plays it",
     )
     results_by: LetNames = Field(
         (),
-        description="one or several `let`: results are also told for each of their values; playing never reads it",
+        description="one or several `let`: results are also told for each of their values; play never "
+        "reads it",
         examples=["condition"],
     )
     published: Annotated[ListOf[Published], Hides(False)] = Field(
         (),
-        description="figures of studies with people, which the data sheet and reports show; playing never reads them",
+        description="figures of studies with people, which the data sheet and reports show; play "
+        "never reads them",
     )
     probes: dict[Word, Probe] = Field(
         default_factory=dict,
         max_length=64,
-        description="name: a question to language models; playing never reads them",
+        description="name: a question to language models; play never reads them",
     )
     tests: dict[Word, DialogueTest] = Field(
         default_factory=dict,
-        description="name: a dialogue that `socialai test` plays; playing never reads them",
+        description="name: a dialogue that must go as written, which `socialai test` plays; play "
+        "never reads them",
     )
 
     def __repr__(self) -> str:

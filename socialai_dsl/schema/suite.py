@@ -33,11 +33,11 @@ Patch = Annotated[dict[str, JsonValue], Holds("patch")]
 class Changes(Model):
     """A suite's changes of a scenario, like a variant's, and the start of its episodes."""
 
-    set: Patch = Field(default_factory=dict, description="path: value, as in a variant")
-    remove: ListOf[Annotated[str, Holds("spelt")]] = Field((), description="paths")
-    add: Patch = Field(default_factory=dict, description="path: items or keys")
+    set: Patch = Field(default_factory=dict, description="path: its new value, as in a variant")
+    remove: ListOf[Annotated[str, Holds("spelt")]] = Field((), description="paths of what is left out")
+    add: Patch = Field(default_factory=dict, description="path of a list or mapping: what is added to it")
     layout: Annotated[dict[str, JsonValue], Holds("layout")] | None = Field(
-        None, description="the start of every episode; the rest is drawn"
+        None, description="the known part of every episode's room; the rest is drawn"
     )
 
 
@@ -56,7 +56,7 @@ class Value(Changes):
     model_config = ConfigDict(extra="allow", json_schema_extra={"propertyNames": WORD_SCHEMA})
     __pydantic_extra__: dict[Word, Values]
 
-    about: Prose | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
     scenario: MemberName | None = Field(None, description="the scenario; deeper ones replace it")
 
 
@@ -82,10 +82,11 @@ class Split(Model):
         None, min_length=1, max_length=64, description="all members of this split"
     )
     only: dict[Word, Labels] | None = Field(
-        None, description="parameter: value or values; leaves that have all of them"
+        None,
+        description="parameter: value or values; the leaves that have one of the values of every parameter",
     )
     without: dict[Word, Labels] | None = Field(
-        None, description="parameter: value or values; leaves that do not have all of them"
+        None, description="parameter: value or values; all leaves but those that `only` would choose"
     )
 
 
@@ -93,33 +94,47 @@ class Suite(Model):
     """Several scenarios with one action space; each episode plays one of them."""
 
     suite: Word = Field(description="the name of the suite")
-    about: Prose | None = Field(None, description="one sentence for people")
-    notes: Prose | None = Field(None, description="more for people")
-    skills: ListOf[Prose] = Field((), description="the skills that it needs, for people")
+    about: Prose | None = Field(None, description="one sentence for readers of the file")
+    notes: Prose | None = Field(None, description="more for readers of the file")
+    skills: ListOf[Prose] = Field((), description="the skills that it needs, for readers of the file")
     training_frames: int | None = Field(
-        None, ge=1, description="how long the recipe guided trains an agent for"
+        None,
+        ge=1,
+        description="the number of frames for which the recipe `guided` trains an agent; default 6000000",
     )
     draw: Literal["uniform", "in_sequence"] = Field(
-        "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"
+        "uniform", description="`uniform`: an episode plays one member; `in_sequence`: all of them, as acts"
     )
     members: Annotated[ListOf[MemberName | Entry], Field(min_length=1, max_length=64)] | None = Field(
-        None, description="scenarios"
+        None, description="scenarios by path, with variants and parameters, or changed ones"
     )
     sweep: dict[MemberName, Annotated[dict[str, ListOf[JsonValue]], Holds("patch")]] | None = Field(
         None, min_length=1, description="member: {path: values}; each combination is a member of its own"
     )
-    tree: Value | None = Field(None, description="parameters with their values; an episode plays a leaf")
+    tree: Value | None = Field(
+        None, description="parameters with their values, in place of members; an episode plays a leaf"
+    )
     grammar: Annotated[
         Annotated[Literal["union", "concat"], Tag("word")] | Annotated[UtteranceGrammar, Tag("written out")],
         Discriminator(_form),
-    ] = Field("union", description="union: each text once; concat: one behind the other; or written out")
+    ] = Field(
+        "union",
+        description="`union`: each template and noun once, in the order of the members; `concat`: the "
+        "grammars one behind the other; or written out",
+    )
     actions: Annotated[
         Annotated[Literal["union"], Tag("word")] | Annotated[ListOf[Primitive], Tag("written out")],
         Discriminator(_form),
-    ] = Field("union", description="the body actions in every member")
-    splits: dict[Word, Split] = Field(default_factory=dict, description="chosen by ?split=NAME")
+    ] = Field(
+        "union",
+        description="the body actions in every member, whatever its own `actions`: all that a member has, "
+        "or a list",
+    )
+    splits: dict[Word, Split] = Field(
+        default_factory=dict, description="name: other members, which `?split=NAME` chooses"
+    )
     held_out: dict[Word, Labels] | None = Field(
         None,
         min_length=1,
-        description="parameter: value or values of the tree that only a split plays which names them in `only`",
+        description="parameter: value or values of the tree that only a split plays whose `only` names them",
     )

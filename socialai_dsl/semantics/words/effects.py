@@ -120,16 +120,22 @@ def _move_into(caused: Caused) -> Term:
 
 
 EFFECTS: Final = (
-    Change("open", "object", doc="becomes open", makes="open"),
-    Change("close", "object", doc="becomes closed", makes="closed"),
-    Change("lock", "object", doc="becomes locked", makes="locked"),
-    Change("unlock", "object", doc="closed, if it was locked", needs="locked"),
-    Change("reset", "entity", doc="status, place and content as when the episode began", meaning=_reset),
-    Change("vanish", "entity", doc="leaves the room; it is `gone`", takes_away=True, meaning=_vanish),
-    Change("reveal", "object", doc="becomes opened", makes="opened"),
-    Change("put", "entity", doc="put(x): comes to the cell of x", takes=("entity",), takes_away=True, carries_off=True,
-           meaning=_put),
-    Change("move_into", "object", doc="move_into(x): lies in x, or is carried by x", takes=("entity",), takes_away=True,
-           carries_off=True, meaning=_move_into),
-    Change("become", "object", doc="takes this status", takes=("status",), meaning=_become),
+    Change("open", "object", doc="it becomes open", makes="open"),
+    Change("close", "object", doc="it becomes closed", makes="closed"),
+    Change("lock", "object", doc="it becomes locked", makes="locked"),
+    Change("unlock", "object", doc="if it is locked, it becomes closed, a box shut", needs="locked"),
+    Change("reset", "entity",
+           doc="an object has its first status, place and content again, its timer at 0; an NPC its first "
+               "place, if that is free, and direction, and points no longer", meaning=_reset),
+    Change("vanish", "entity", doc="an object or an NPC leaves the room: it is `gone`", takes_away=True,
+           meaning=_vanish),
+    Change("reveal", "object", doc="it becomes opened, and its content takes its place", makes="opened"),
+    Change("put", "entity",
+           doc="it comes to the cell x, or the cell of x, also from out of the room; a member only where it "
+               "can stand. Without effect if x is out of the room", takes=("entity",), takes_away=True,
+           carries_off=True, meaning=_put),
+    Change("move_into", "object",
+           doc="it lies in the object x from now on, out of the room; if x is a member with empty hands, x "
+               "carries it", takes=("entity",), takes_away=True, carries_off=True, meaning=_move_into),
+    Change("become", "object", doc="it takes this status", takes=("status",), meaning=_become),
 )  # fmt: skip

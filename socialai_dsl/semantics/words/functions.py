@@ -68,27 +68,31 @@ def _needs_more(use: Use) -> Term:
 
 
 FUNCTIONS: Final = (
-    Value("min", "none", ("int", "int"), "number", "the smaller", meaning=_computed),
-    Value("max", "none", ("int", "int"), "number", "the larger", meaning=_computed),
-    Value("abs", "none", ("int",), "number", "without its sign", meaning=_computed),
-    Value("opposite", "none", ("direction",), "direction", "the direction turned round", meaning=_opposite),
-    Value("prev", "none", ("any",), "the same", "prev(e): e as it was when the step began", momentary=True,
+    Value("min", "none", ("int", "int"), "number", "the smaller number", meaning=_computed),
+    Value("max", "none", ("int", "int"), "number", "the larger number", meaning=_computed),
+    Value("abs", "none", ("int",), "number", "the number without its sign", meaning=_computed),
+    Value("opposite", "none", ("direction",), "direction", "the direction turned by 180 degrees", meaning=_opposite),
+    Value("prev", "none", ("any",), "the same",
+          "the value of e when the step began; it finds nothing now if e found nothing then", momentary=True,
           also=("previous", "before"), meaning=_before),
 )  # fmt: skip
 
 QUANTIFIERS: Final = (
-    Value("any", "none", ("group",), "condition", "any(d in group where ...): one of them does",
+    Value("any", "none", ("group",), "condition", "c holds for at least one d: `any(d in doors where d.open)`",
           also=("exists", "some"), meaning=_needs_more),
-    Value("all", "none", ("group",), "condition", "all(d in group where ...): each of them does",
+    Value("all", "none", ("group",), "condition", "c holds for each d: `all(d in doors where d.open)`",
           also=("forall", "for_all", "every"), meaning=_needs_more),
-    Value("count", "none", ("group",), "number", "count(d in group where ...): how many do",
+    Value("count", "none", ("group",), "number", "the number of d for which c holds: `count(d in doors where d.open)`",
           also=("len", "number_of", "how_many"), meaning=_whole_group),
-    Value("first", "none", ("group",), "one of them", "first(d in group where ...): the first that does",
+    Value("first", "none", ("group",), "one of them", "the first d for which c holds: `first(d in doors where d.open)`",
           meaning=_whole_group),
-    Value("pick", "none", ("group",), "one of them", "pick(group), pick(d in group where ...): drawn at random",
-          also=("choice", "sample", "draw", "random", "one_of"), meaning=_whole_group),
-    Value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y",
-          also=("closest",), meaning=_needs_more),
-    Value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do",
-          meaning=_needs_more),
+    Value("pick", "none", ("group",), "one of them",
+          "one d for which c holds, drawn anew at each use: `pick(doors)`, `pick(d in doors where d.open)`, "
+          "`pick(red | 2 * blue)`", also=("choice", "sample", "draw", "random", "one_of"),
+          meaning=_whole_group),
+    Value("nearest", "none", ("group",), "one of them",
+          "the d nearest to y for which c holds, the first of equally near ones: `nearest(d in doors to "
+          "agent)`", also=("closest",), meaning=_needs_more),
+    Value("those", "none", ("group",), "of them",
+          "in `cause` and `set`: every d for which c held before the rule's effects", meaning=_needs_more),
 )  # fmt: skip

@@ -95,17 +95,23 @@ def _each_wall(placed: Placed) -> tuple[Region, ...]:
 
 
 PLACES: Final = (
-    Place("anywhere", doc="all free cells of the room"),
-    Place("nowhere", doc="not in the room", meaning=lambda _: ()),
+    Place("anywhere", doc="all floor cells of the room"),
+    Place("nowhere", doc="no cell: it is not in the room", meaning=lambda _: ()),
     Place("left_half", doc="x < W // 2"),
     Place("right_half", doc="x > W // 2"),
     Place("top_half", doc="y < H // 2"),
     Place("bottom_half", doc="y > H // 2"),
-    Place("column", takes=("int",), doc="the column x, without the walls"),
-    Place("row", takes=("int",), doc="the row y, without the walls"),
-    Place("rect", takes=("int", "int", "int", "int"), doc="from (x0, y0) to (x1, y1)", meaning=_rect),
-    Place("next_to", takes=("entities",), doc="one cell away from x", meaning=_about),
-    Place("in_front_of", takes=("entities",), doc="the cell before x", meaning=_about),
-    Place("wall", takes=("side",), doc="in this wall, not in its corners", meaning=_wall),
-    Place("each_wall", takes=("int",), doc="one in each wall, n off the corners", optional=1, meaning=_each_wall),
+    Place("column", takes=("int",), doc="column x, without the walls"),
+    Place("row", takes=("int",), doc="row y, without the walls"),
+    Place("rect", takes=("int", "int", "int", "int"),
+          doc="the rectangle from (x0, y0) to (x1, y1), without the walls", meaning=_rect),
+    Place("next_to", takes=("entities",), doc="the cells at a Manhattan distance of 1 from x", meaning=_about),
+    Place("in_front_of", takes=("entities",),
+          doc="the cell that x, a member, faces; for x in a wall, the cell one step into the room",
+          meaning=_about),
+    Place("wall", takes=("side",),
+          doc="in the wall on this side (top, bottom, left, right), not in its corners", meaning=_wall),
+    Place("each_wall", takes=("int",),
+          doc="for a group of 2 to 4: one each in the top, bottom, left and right wall, at least `margin` "
+              "cells (1) from the corners", optional=1, meaning=_each_wall),
 )  # fmt: skip

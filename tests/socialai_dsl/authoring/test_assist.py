@@ -192,13 +192,13 @@ def test_files_beside(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("face(agent)", "fa^ce(agent)", "turn towards x"),
+        ("face(agent)", "fa^ce(agent)", "a quarter turn per step towards x"),
         ("do: face", "d^o: face", "an activity"),
-        ("agent.at(exit)", "agent.a^t(exit)", "on the same cell"),
+        ("agent.at(exit)", "agent.a^t(exit)", "on the cell of x"),
         ("agent.at(exit)", "agent.at(ex^it)", "an object"),
         ("exit.color", "exit.co^lor", "its colour"),
         ("  shade:", "  sh^ade:", "drawn or computed once per episode"),
-        ("frame: duty", "fr^ame: duty", "the frame it follows"),
+        ("frame: duty", "fr^ame: duty", "the frame that it follows"),
         ("frame: duty", "frame: d^uty", "a frame"),
         ("outcome:", "pro^bes: {q: {ask: Which}}\noutcome:", "a question to language models"),
         ("outcome:", "probes: {q: {an^swer: exit.color}}\noutcome:", "the right answer at that moment"),

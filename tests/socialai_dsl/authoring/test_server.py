@@ -240,8 +240,8 @@ async def completions(editor: Editor) -> None:
 
 
 async def hovers(editor: Editor) -> None:
-    assert "the state from the next step on" in await editor.hover(SCENARIO.replace("goto:", "go^to:"))
-    assert "each turned to the other" in await editor.hover(SCENARIO.replace("eye_contact(", "eye_con^tact("))
+    assert "the state to enter" in await editor.hover(SCENARIO.replace("goto:", "go^to:"))
+    assert "each facing the other" in await editor.hover(SCENARIO.replace("eye_contact(", "eye_con^tact("))
     assert "an object" in await editor.hover(SCENARIO.replace("what: gate}", "what: ga^te}"))
     assert "a state of `duty`" in await editor.hover(
         SCENARIO.replace("keeper.is(content)", "keeper.is(con^tent)")

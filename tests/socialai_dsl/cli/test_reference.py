@@ -49,3 +49,8 @@ def test_what_a_key_takes_is_said_in_words(printed: str) -> None:
     assert "typing" not in printed
     assert "socialai_dsl" not in printed
     assert "tuple" not in printed
+
+
+def test_no_word_in_angle_brackets_is_taken_for_html(printed: str) -> None:
+    """Markdown leaves out `<noun>` where it does not stand in code."""
+    assert re.findall(r"<\w+", re.sub(r"`[^`\n]*`", "", printed)) == []
