@@ -756,12 +756,12 @@ def test_who_waits_for_the_first_room_is_told_what_for(page: Page, server: Serve
     page.route_web_socket(re.compile("/session"), connect)
     page.goto(server.address)
     page.get_by_text("while the engine is compiled").wait_for()
-    assert not page.get_by_text("Nothing is wrong.").is_visible()
+    assert not page.get_by_text("Nothing is wrong in this file.").is_visible()
     until(page, lambda: bool(kept))
     held = False
     routes[0].send(kept[0])
     drawn(page)
-    assert page.get_by_text("Nothing is wrong.").is_visible()
+    assert page.get_by_text("Nothing is wrong in this file.").is_visible()
     assert not page.get_by_text("while the engine is compiled").is_visible()
 
 

@@ -56,7 +56,7 @@ class Studio {
     /** @type {Reply[]} drafts that no window shows */ this.others = [];
     this.kept = make("button", { onclick: () => this.offerDrafts(), hidden: true });
     this.findings = make("ul", { class: "findings", "aria-label": "findings" });
-    this.sound = make("p", { class: "quiet", hidden: true }, "Nothing is wrong.");
+    this.sound = make("p", { class: "quiet", hidden: true }, "Nothing is wrong in this file.");
     this.message = make("p", { class: "message", role: "status" });
     this.title = make("h1", {}, "studio");
     this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.another({ seed: Number(this.seedField.value) }) });
