@@ -190,6 +190,8 @@ class Live:
         for event in read_log(self._file):
             if event["event"] == "study":
                 self._check(event)
+            if "spent" in event:
+                self._players.spent_before(event["spent"])
             self.progress.apply(event)
             count += 1
         return count
@@ -561,10 +563,12 @@ class Live:
                 continue
             by[seat] = acting[seat]
             acts[seat] = replies[seat][1] if seat in replies else episode.chosen(seat, by[seat])
-        more: dict[str, Any] = (
-            {"replies": {seat: said for seat, (said, _) in replies.items()}} if replies else {}
-        )
-        more |= {"missed": missed} if missed else {}
+        kept = {
+            "replies": {seat: said for seat, (said, _) in replies.items()},
+            "missed": missed,
+            "spent": self._players.spent if models or missed else None,
+        }
+        more: dict[str, Any] = {key: value for key, value in kept.items() if value}
         place = {"game": game.id, "episode": len(game.results), "t": episode.t}
         self._do("step", **place, acts=acts, by=by, times=times, **more)
         if running.thinking is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import httpx
@@ -73,6 +73,17 @@ class Endpoints:
         self._answered.add(who)
         self._spent += answer.usage
         return answer
+
+    @property
+    def spent(self) -> dict[str, Any]:
+        """What all answers took, failed ones too, as the log has it."""
+        return asdict(self._spent)
+
+    def spent_before(self, spent: Mapping[str, Any]) -> None:
+        """Take it that so much was spent before, as the log says, so that a budget outlives the server."""
+        before = Usage(**spent)
+        if before.tokens > self._spent.tokens:
+            self._spent = before
 
     async def close(self) -> None:
         """Let the connections go."""

@@ -89,6 +89,16 @@ class Players:
         seats = {seat: ModelSeat(arena, seat, who, endpoints) for seat, who in models.items()}
         return Thinking(seats, self._study.blocks[block].act_within)
 
+    @property
+    def spent(self) -> dict[str, Any] | None:
+        """What the language models have taken so far; None if there are none."""
+        return None if self._endpoints is None else self._endpoints.spent
+
+    def spent_before(self, spent: Mapping[str, Any]) -> None:
+        """Take it that the language models have taken so much before."""
+        if self._endpoints is not None:
+            self._endpoints.spent_before(spent)
+
     def give(self, block: int, episode: Episode) -> None:
         """Take back the agents that have played in an episode of a block."""
         for seat, policy in episode.acting.items():

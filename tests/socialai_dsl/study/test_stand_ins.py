@@ -7,6 +7,7 @@ import random
 import shlex
 import shutil
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -415,20 +416,27 @@ def test_a_person_who_is_late_is_stood_in_for_by_a_model_which_gets_its_own_time
     assert [event["by"]["jill"] for event in steps(tmp_path)] == ["llm:stub", "person"]
 
 
-def test_a_budget_that_is_spent_leaves_the_seat_to_the_script(tmp_path: Path) -> None:
+@pytest.mark.parametrize("servers", [[4], [1, 3], [3, 1]])
+def test_a_budget_that_is_spent_leaves_the_seat_to_the_script(servers: list[int], tmp_path: Path) -> None:
+    """Also if it was spent before the server was started again, after so many steps."""
     pytest.importorskip("httpx", reason="language models need the extra llm")
     with endpoint(lambda request: "Act: right") as stub:
         loaded = loaded_study(model(BESIDE, stub, budget="'24'"), tmp_path)
 
-        async def play() -> None:
+        async def play(person: str | None, count: int) -> str:
             live = Live(loaded, tmp_path)
-            one = await newcomer(live)
-            await one.go()
-            for t in range(4):
+            one = await newcomer(live) if person is None else await Taking(live, person).come()
+            if person is None:
+                await one.go()
+            begun = one.now["t"]
+            for t in range(begun, begun + count):
                 await one.act("left")
                 await until_true(lambda t=t: one.now["t"] > t)
             await live.close()
+            return one.person
 
-        run(play)
+        person = None
+        for count in servers:
+            person = run(partial(play, person, count))
     assert [event["by"]["jill"] for event in steps(tmp_path)] == ["llm:stub"] * 2 + ["script"] * 2
     assert steps(tmp_path)[-1]["missed"] == {"jill": "the budget is spent"}
