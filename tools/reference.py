@@ -231,9 +231,10 @@ def _words() -> Iterator[str]:
 
     yield "## Words\n"
     yield (
-        "`a` is a member of the cast or an object, `n` a member, `o` an object, `x` one of them, a cell or a group, any\n"
-        "member of which suffices. \"It\" is what stands before the dot; in a frame that may be left out, and is then the\n"
-        "member that follows the frame. [Expressions](language.md#expressions) has the rules for all of them.\n"
+        "`a` is a member of the cast or an object, `n` a member, `o` an object, `x` one of them, a cell or a group,\n"
+        'any member of which suffices. "It" is what stands before the dot; in a frame that may be left out, and\n'
+        "is then the member that follows the frame.\n"
+        "[Expressions](language.md#expressions) has the rules for all of them.\n"
     )
     yield "### Conditions and values\n"
     yield "| word | gives | meaning |\n|---|---|---|"
