@@ -13,7 +13,7 @@ import pytest
 from socialai_dsl.engine.jit import is_interpreted
 
 ROOT = Path(__file__).parents[3]
-PROCESSES = 16
+PROCESSES = 4
 NOTICE = "socialai: compiling the engine, once for this machine: 20 to 70 seconds\n"
 LOOK = """
 import socialai_dsl as sd
