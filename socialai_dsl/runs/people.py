@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # these load pandas, which is only there if reports were aske
     from socialai_dsl.reporting.records import Figures, QuestionRecord, StudyRecord
 
 _A_PERSON: Final = "a person"
+_IN_PART: Final = "in part by stand-ins"
 
 
 def is_study(folder: Path) -> bool:
@@ -104,7 +105,7 @@ def _read(folders: Sequence[Path]) -> tuple[list[_Study], list[str]]:
 # -- conditions --------------------------------------------------------------------------------------------------------
 
 _Place = tuple[str, str, str]
-"""A block, a seat, and who had the others."""
+"""A block, a seat, and who had the others, as `_Beside.others` says it."""
 
 
 def _conditions(study: _Study, experiment: Experiment, several: bool) -> tuple[list[Condition], list[str]]:
@@ -202,9 +203,11 @@ class _Beside:
             self.rules[row["game"], row["trial"]][row["rule"]] = row["times"]
 
     def others(self, row: Row) -> str:
-        """Who had the other seats of an episode, in words."""
+        """Who had the other seats of an episode, in words, and whether somebody stood in for a person in it."""
         pairs = (one.partition("=") for one in shlex.split(row["others"]))
-        return ", ".join(f"{seat} by {_A_PERSON if who in self._ids else who}" for seat, _, who in pairs)
+        words = [f"{seat} by {_A_PERSON if who in self._ids else who}" for seat, _, who in pairs]
+        stood_in = row["stood_in"] or row["own_steps"] < row["steps"]
+        return ", ".join([*words, *([_IN_PART] if stood_in else [])])
 
 
 def _person(

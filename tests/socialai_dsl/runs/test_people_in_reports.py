@@ -279,6 +279,25 @@ def test_two_people_in_one_room_stand_beside_those_who_play_both_seats(tmp_path:
     assert pair["rooms"] == "3"
 
 
+def test_episodes_with_stand_ins_are_conditions_of_their_own(tmp_path: Path) -> None:
+    from socialai_dsl.study.rehearsal import rehearse
+
+    (tmp_path / "together.yaml").write_text(TOGETHER.replace("away: 600", "away: 5"), encoding="utf-8")
+    (tmp_path / "log").mkdir()
+    rehearsal = rehearse(
+        load_study(tmp_path / "together.yaml"), tmp_path / "log", 4, speed=100, kinds=("script", "leaving")
+    )
+    tables = rehearsal.data.tables
+    counted = {row["participant"] for row in tables["participants"] if not row["excluded"]}
+    stayed = [row for row in tables["episodes"] if row["participant"] in counted and not row["left"]]
+    with_stand_ins = [row for row in stayed if row["stood_in"]]
+    assert with_stand_ins, "somebody left in the middle of an episode"
+    assert main(["report", str(tmp_path / "log"), "--no-baselines", "--out", str(tmp_path / "report")]) == 0
+    minds = {row["condition"]: int(row["episodes"]) for row in rows(tmp_path / "report" / "minds.csv")}
+    in_part = [count for name, count in minds.items() if "in part by stand-ins)" in name]
+    assert (sum(in_part), sum(minds.values())) == (len(with_stand_ins), len(stayed))
+
+
 # -- what is wrong with a study ----------------------------------------------------------------------------------------
 
 
