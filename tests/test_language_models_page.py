@@ -8,8 +8,11 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl import load
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.cli.main import main
 from socialai_dsl.llm import Episode
+from tests import shipped
 from tests.socialai_dsl.llm.endpoint import endpoint
 from tests.socialai_dsl.reporting.page_reader import Page
 
@@ -94,3 +97,11 @@ def test_the_command_about_probes_prints_such_a_table(
         table = found + "\n"
     assert table == found + "\n", "if the new text is meant, run pytest --update-goldens"
     assert "of 20 right, by chance 50.0%" in found
+
+
+def test_the_page_names_the_scenarios_with_probes() -> None:
+    named = re.search(r"These scenarios have probes: (.*)\.", PAGE.read_text(encoding="utf-8"))
+    assert named is not None
+    loaded = {name: load(name) for name in shipped.scenarios()}
+    asked = {name for name, one in loaded.items() if isinstance(one, LoadedScenario) and one.scenario.probes}
+    assert set(re.findall(r"`(.*?)`", named[1])) == asked
