@@ -43,7 +43,9 @@ DOCUMENTS = [
 ]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 FINDINGS = ROOT / "docs" / "diagnostics"  # their commands and files are wrong on purpose: tests/diagnostics
-REFERENCE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+REFERENCE = "\n".join(
+    (ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("language.md", "reference.md")
+)
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!https?://)([^)\s]+)\)")
@@ -270,7 +272,7 @@ def test_what_the_page_about_tests_shows_is_printed(
 
 
 def mentioned(text: str = REFERENCE) -> set[str]:
-    """Every word that stands in code in the reference, or on another page."""
+    """Every word that stands in code in the guide and the reference of the language, or on another page."""
     code = re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
     return {word for text in code for word in re.findall(r"[A-Za-z_]\w*", text)}
 

@@ -3,7 +3,7 @@
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, Final, get_args, get_origin
@@ -227,7 +227,7 @@ _ARGUMENTS: Final = {
 
 
 def _words() -> Iterator[str]:
-    from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, VALUES
+    from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, NAMES, PLACES, VALUES
 
     yield "## Words\n"
     yield (
@@ -240,6 +240,10 @@ def _words() -> Iterator[str]:
     yield "| word | gives | meaning |\n|---|---|---|"
     for value in VALUES.values():
         yield f"| `{_written(value)}` | {value.gives} | {_cell(value.doc)} |"
+    yield ""
+    yield "### Names\n"
+    yield "| name | meaning |\n|---|---|"
+    yield from (f"| `{name}` | {_cell(meaning)} |" for name, meaning in NAMES.items())
     yield ""
     others: dict[str, Iterable[Signature]] = {
         "Places": PLACES.values(), "Activities": ACTIVITIES.values(), "Effects": EFFECTS.values(),
@@ -282,14 +286,39 @@ def _types() -> Iterator[str]:
     from socialai_dsl.library import prelude
 
     yield "## Object types\n"
-    yield "| type | code | statuses, the initial one first | can be entered | colour |\n|---|---|---|---|---|"
+    yield (
+        "The image shows a status as its place among the statuses, from 0; the initial one is in *italics*.\n"
+        "A toggle, a push and the end of a `timer` change the status as their columns say. In an *active* status the\n"
+        "object works on what it `unlocks` or `opens`.\n"
+    )
+    titles = (
+        "type",
+        "code",
+        "statuses",
+        "can be entered",
+        "can be seen through",
+        "toggle",
+        "push",
+        "timer",
+        "active",
+        "colour",
+    )
+    yield f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}"
     for name, type_ in prelude().types.items():
-        states = [type_.states[type_.initial], *(s for i, s in enumerate(type_.states) if i != type_.initial)]
-        walkable = [type_.states[i] for i in sorted(type_.walkable)]
-        always = len(walkable) == len(states)
-        entered = "always" if always else ", ".join(walkable) or "never"
-        yield f"| `{name}` | {type_.code} | {', '.join(states)} | {entered} | {prelude().colors[name]} |"
+        statuses = [f"*{word}*" if i == type_.initial else word for i, word in enumerate(type_.states)]
+        cells = [f"`{name}`", str(type_.code), ", ".join(statuses)]
+        for allowed in (type_.walkable, type_.transparent):
+            found = [type_.states[i] for i in sorted(allowed)]
+            cells.append("always" if len(found) == len(statuses) else ", ".join(found) or "never")
+        cells[3] += ", deadly" if type_.deadly else ""
+        cells += [_changes(type_.states, becomes) for becomes in (type_.toggled, type_.pushed, type_.expired)]
+        cells += [", ".join(type_.states[i] for i in sorted(type_.active)), prelude().colors[name]]
+        yield f"| {' | '.join(cells)} |"
     yield ""
+
+
+def _changes(states: Sequence[str], becomes: Mapping[int, int]) -> str:
+    return ", ".join(f"{states[before]} -> {states[after]}" for before, after in becomes.items())
 
 
 def _grammars() -> Iterator[str]:

@@ -20,25 +20,9 @@ from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.dialogues import ENDS
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.typed import STANDING
-from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, SIGNATURES, VALUES
+from socialai_dsl.semantics.words import ACTIVITIES, EFFECTS, NAMES, PLACES, QUANTIFIERS, SIGNATURES, VALUES
 from socialai_dsl.source import Data, DataPath, Node
 from socialai_dsl.vocabulary import PRIMITIVES
-
-_WORDS: Final = {
-    "agent": "the agent, whom a policy plays",
-    "self": "the NPC that follows the frame",
-    "speaker": "who said what is heard",
-    "here": "the cell a place is asked about",
-    "t": "the number of steps so far",
-    "W": "the width of the room, walls included",
-    "H": "the height of the room, walls included",
-    "cells": "the cells of the room without its walls",
-    "colors": "red, green, blue, purple, yellow, grey",
-    "nouns": "the nouns of the grammar",
-    "random": "drawn",
-    "if": "`a if condition else b`: a where the condition holds, else b",
-    "else": "`a if condition else b`: a where the condition holds, else b",
-}
 
 Kind = Literal["key", "name", "verb", "word", "file"]
 
@@ -90,7 +74,7 @@ def _about_word(cursor: Cursor, data: Data) -> str | None:
     for signature in _signatures(cursor):
         if signature.name == word:
             return f"**{usage(signature)}**: {signature.doc}"
-    return f"**{word}**: {_WORDS[word]}" if word in _WORDS and not cursor.is_key else None
+    return f"**{word}**: {NAMES[word]}" if word in NAMES and not cursor.is_key else None
 
 
 def _declares(cursor: Cursor) -> Iterator[Name]:
@@ -259,7 +243,7 @@ def _in_expression(cursor: Cursor, data: Data, held: Holds | None) -> Iterator[O
     for table in tables:
         yield from _verbs(table.values(), {"none"} if table is not VALUES else {"none", "own"})
     if VALUES in tables or kind in ("effect", "place"):
-        yield from (Offer(word, "word", about) for word, about in _WORDS.items())
+        yield from (Offer(word, "word", about) for word, about in NAMES.items())
 
 
 def _kinds_of(subject: str, data: Data) -> set[str]:

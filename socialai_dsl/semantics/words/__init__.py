@@ -57,4 +57,30 @@ RESERVED: Final = frozenset(
 )  # fmt: skip
 """Words that mean something already, so that nothing an author declares may be called so."""
 
+NAMES: Final = {
+    "agent": "the agent, whom a policy, a language model or a person plays",
+    "self": "in a frame: the member of the cast that follows it",
+    "speaker": "in a rule with `hears`: the speaker of what was heard",
+    "it": "each of a group in turn: in its conditions and initial values, and in the frame that its members follow",
+    "here": "in the `where` of a place: the candidate cell",
+    "t": "the number of steps since the reset",
+    "W": "the width of the room in cells, walls included",
+    "H": "the height of the room in cells, walls included",
+    "objects": "the group of all objects",
+    "cells": "the group of all floor cells of the room",
+    "colors": "the group of the colours: red, green, blue, purple, yellow, grey",
+    "nouns": "the group of the nouns of the grammar",
+    "believes": "`n.believes.key`: the value of a belief of n",
+    "permuted": "`permuted(table)`, `permuted(group)`: the same values in an order that each episode draws",
+    "random": "as a colour, a direction or the start of a look: drawn, all alike",
+    "distinct": "as a colour: drawn, no two of the group alike",
+    "toward": "`toward(x)` in `facing`: the direction in which x lies",
+    "ever": "in `for` of an entry of `steps`: without an end",
+    "finished": "the state of a frame after its last entry of `steps`",
+    "none": "nothing: of a register or belief that is empty, or a body action that is no movement",
+    "if": "`a if condition else b`: a where the condition holds, else b",
+    "else": "`a if condition else b`: a where the condition holds, else b",
+}
+"""Names that mean the same in every file, and what."""
+
 WORDS: Final = Words(VALUES, QUANTIFIERS, RESERVED)
