@@ -11,8 +11,9 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
+from datetime import datetime
 from http.client import HTTPConnection, HTTPException
 from itertools import count
 from pathlib import Path
@@ -51,8 +52,11 @@ KILLS = 50
 class Server:
     """A server in a process of its own, always at the same address."""
 
-    def __init__(self, folder: Path, out: Path, limit: int | None = None) -> None:
+    def __init__(
+        self, folder: Path, out: Path, limit: int | None = None, environment: Mapping[str, str] | None = None
+    ) -> None:
         self._folder, self._out, self._limit = folder, out, limit
+        self._environment = {**os.environ, **(environment or {})}
         self.port, self.links = 0, []
         self.process: subprocess.Popen[str]
 
@@ -70,7 +74,12 @@ class Server:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (self._limit, resource.RLIM_INFINITY))
 
         self.process = subprocess.Popen(
-            [*command, *more], cwd=self._folder, stdout=subprocess.PIPE, text=True, preexec_fn=bounded
+            [*command, *more],
+            cwd=self._folder,
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=bounded,
+            env=self._environment,
         )
         assert self.process.stdout is not None
         if links:
@@ -98,9 +107,15 @@ class Server:
 
 
 @contextmanager
-def served(folder: Path, out: Path, links: int, limit: int | None = None) -> Iterator[Server]:
+def served(
+    folder: Path,
+    out: Path,
+    links: int,
+    limit: int | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> Iterator[Server]:
     (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
-    server = Server(folder, out, limit)
+    server = Server(folder, out, limit, environment)
     server.start(links)
     try:
         server.wait()
@@ -222,6 +237,41 @@ def test_a_server_that_is_killed_at_random_moments_loses_nothing(tmp_path: Path)
     assert seen > KILLS
     starts = sum(event["event"] == "server" for event in read_log(out / FILE))
     assert starts > KILLS // 2
+
+
+@pytest.mark.thorough("plays while the clock of the server is set, which needs libfaketime")
+def test_a_clock_that_is_set_while_people_play_changes_nothing(tmp_path: Path) -> None:
+    """By a day and by a month, to and fro: the log has the times as they were, each act once, and goes on."""
+    library = next(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
+    if library is None:
+        pytest.skip("needs libfaketime")
+    out, offset = tmp_path / "out", tmp_path / "offset"
+    offset.write_text("+0", encoding="utf-8")
+    environment = {
+        "LD_PRELOAD": str(library),
+        "FAKETIME_TIMESTAMP_FILE": str(offset),
+        "FAKETIME_CACHE_DURATION": "1",
+        "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+    }
+    with served(tmp_path, out, links=4, environment=environment) as server:
+        clients = [Client(server, code) for code in server.links]
+        for client in clients:
+            client.start()
+        for moved in ("+0", "-1d", "+30d", "-30d", "+0"):
+            offset.write_text(moved, encoding="utf-8")
+            count_before = [len(client.seen) for client in clients]
+            time.sleep(4)
+            assert all(len(c.seen) > before for c, before in zip(clients, count_before, strict=True)), moved
+        for client in clients:
+            client.over.set()
+        for client in clients:
+            client.join(20)
+    assert compare(clients, tmp_path, out) > 0
+    events = list(read_log(out / FILE))
+    days = [datetime.fromisoformat(event["time"]).toordinal() for event in events]
+    assert max(days) - min(days) >= 59, "the clock was set"
+    seconds = [event["mono"] for event in events]
+    assert seconds == sorted(seconds)
 
 
 @contextmanager
