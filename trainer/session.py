@@ -278,7 +278,7 @@ class Session:
             detail = ", ".join(f"{name}: {getattr(old, name)} -> {getattr(new, name)}" for name in changed)
             if changed == ["frames"]:
                 detail += (
-                    " (guide, schedules, own bonus and own algorithm reach from the first frame to the last)"
+                    " (a guide, a schedule, or your own bonus or algorithm depends on the number of frames)"
                 )
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 

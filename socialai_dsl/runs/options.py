@@ -107,7 +107,7 @@ def continued_config(config: RunConfig, options: Mapping[str, Any], folder: Path
         name, reason = changed[0], "because a run goes on with the options it began with"
         if name == "frames":
             reason = (
-                "because guide, schedules, own bonus or own algorithm reach from the first frame to the last"
+                "because a guide, a schedule, or your own bonus or algorithm depends on the number of frames"
             )
         raise OptionError(name, f"got {getattr(asked, name)}, expected {getattr(config, name)}, {reason}")
     return asked

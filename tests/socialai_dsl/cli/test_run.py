@@ -459,7 +459,7 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     capsys.readouterr()
     assert run_main(["--resume", "here", "--frames", "4096"]) == 2
     (said,) = capsys.readouterr().err.splitlines()
-    assert "--frames: got 4096, expected 2048, because guide, schedules" in said
+    assert "--frames: got 4096, expected 2048, because a guide, a schedule" in said
     assert json.loads(Path("here/config.json").read_text()) == config, "it can still be resumed as it was"
     assert run_main(["--resume", "here", "--frames", "-1"]) == 2
     assert "--frames: expected at least 0, got -1" in capsys.readouterr().err
