@@ -534,5 +534,7 @@ def test_more_frames_are_another_run_where_schedules_reach_to_the_last(
     schedule: Any, small_config: Any
 ) -> None:
     good = Session.start(small_config(frames=640, **schedule), EchoEnvs(8)).checkpoint()
-    with pytest.raises(CheckpointError, match=r"changed: frames: 640 -> 704 \(a guide, a schedule, or your own"):
+    with pytest.raises(
+        CheckpointError, match=r"changed: frames: 640 -> 704 \(a guide, a schedule, or your own"
+    ):
         Session.start(small_config(frames=704, **schedule), EchoEnvs(8)).load(good)
