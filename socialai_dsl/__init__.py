@@ -1,4 +1,4 @@
-"""socialai-dsl: social grid-worlds declared in YAML, compiled to integer tables, run by the thousand.
+"""Social grid-worlds that are declared in YAML, compiled to integer tables and stepped in batches.
 
 The public surface, imported on first use so that checking a file loads neither Gymnasium nor Numba:
 

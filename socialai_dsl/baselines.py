@@ -43,7 +43,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Baselines:
-    """What a scenario's success is set beside; None what is not known.
+    """Reference levels for the success in a scenario; None where one is not known.
 
     Attributes:
         script: the scenario's own script; None where it has none.

@@ -186,7 +186,7 @@ class Advice(TypedDict, total=False):
 
 
 class ScenarioError(Exception):
-    """A scenario that cannot be used, with everything that was found in it.
+    """A scenario that cannot be used, with all findings.
 
     Attributes:
         diagnostics: the findings, sorted by place; at least one is an error.

@@ -25,7 +25,7 @@ _WORDS_SHOWN = 6
 
 
 class CheckpointPolicy:
-    """A trained agent, which plays as its algorithm plays with a network; `load` makes one.
+    """A trained agent, played as its algorithm prescribes; `load` makes one.
 
     That of PPO samples its actions, as in the paper, or takes the most probable ones if `greedy`; see
     `socialai_dsl.trainer.policy.NetPolicy`.

@@ -123,7 +123,7 @@ def make_vec(
     Args:
         scenario: as for `make`, or a sequence of such; environment i plays number i modulo their number.
         num_envs: E, at least 1.
-        num_threads: 1.
+        num_threads: 1; to use more cores run more processes.
         autoreset_mode: `NextStep`, `SameStep` or `Disabled`.
         copy: False returns the engine's own buffers, valid until the next call.
         render_mode: `rgb_array`, `ansi` or None.

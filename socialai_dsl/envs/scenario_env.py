@@ -279,7 +279,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         """Take one step.
 
         Args:
-            action: four integers.
+            action: integers (3 + slots,).
 
         Returns:
             Observation, reward (float), terminated (an outcome ended the episode), truncated (the horizon did), info.

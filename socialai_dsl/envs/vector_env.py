@@ -289,7 +289,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         return self._table.describe(self._players[player] // self._table.seats)
 
     def set_taken(self, taken: NDArray[np.bool_]) -> None:
-        """Say on which seats players sit from the next step on, over resets; at first on all. For `seats="all"`.
+        """Say on which seats players sit from the next step on, also after resets; initially on all. For `seats="all"`.
 
         While nobody sits on a seat its member follows its frame, or stays, and its actions count for nothing.
 
@@ -341,7 +341,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         return self._table.history_ids()[self._own]
 
     def image_ids(self) -> NDArray[np.int64]:
-        """An id of the picture, int64 (E,): equal for equal pictures."""
+        """An id of the image, int64 (E,): equal for equal images."""
         return self._table.image_ids()[self._own]
 
     @property

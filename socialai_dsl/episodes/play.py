@@ -73,7 +73,7 @@ class Observer:
 
 
 class Rooms:
-    """E rooms of a scenario, in which episodes go on. Whoever plays, plays here, and nobody else steps the environment.
+    """E rooms of a scenario in which episodes are played. Nothing else may step their environment.
 
     Args:
         env: what `make` or `make_vec` returns; a vector environment with `autoreset_mode="Disabled"`.
@@ -337,7 +337,7 @@ class EachRoom:
 class EpisodesInARow:
     """The first K episodes of each room of a seed; those of room e are numbers e * K to e * K + K - 1.
 
-    To count the first episodes that end anywhere would count too many short ones.
+    Counting the first episodes that end anywhere would favour short ones.
     """
 
     trials = 1

@@ -18,7 +18,7 @@ _UNNUMBERED = 1 << 63
 
 
 class Policy(Protocol):
-    """What plays a seat of E rooms. It needs no base class: two methods are enough."""
+    """The interface of a player of one seat in E rooms. No base class is needed: two methods are enough."""
 
     def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
         """Forget the past of environments in which a new episode begins.
@@ -49,7 +49,7 @@ class EpisodeOver(Exception):  # noqa: N818 - no error
 
 
 class Leaving(Protocol):
-    """A policy that has something to do once an episode has ended, such as answering questions about it."""
+    """A policy that acts once more when an episode has ended, for example to answer questions about it."""
 
     async def leave(self) -> None:
         """The episode of the one room is over, and another one may begin.
@@ -60,7 +60,7 @@ class Leaving(Protocol):
 
 
 class RandomPolicy:
-    """Chance: every part of the action is drawn uniformly, so it speaks in half of the steps.
+    """A random player: each part of the action is drawn uniformly, so it speaks in half of the steps.
 
     Args:
         action_sizes: the number of choices of each part, `envs.single_action_space.nvec`.
@@ -121,7 +121,7 @@ class ScriptedPolicy:
 
 
 class FunctionPolicy:
-    """A function that remembers nothing, from the observations of E rooms to int64 (E, heads)."""
+    """A function without memory, from the observations of E rooms to actions, int64 (E, heads)."""
 
     def __init__(self, function: Callable[[Any], Any]) -> None:
         self._function = function
@@ -135,7 +135,7 @@ class FunctionPolicy:
 
 
 class PredictingPolicy:
-    """A model of Stable-Baselines3 or sb3-contrib, or whatever has its method `predict`; a recurrent one remembers.
+    """A model of Stable-Baselines3 or sb3-contrib, or any object with their method `predict`, recurrent or not.
 
     Args:
         model: the model; it samples, from PyTorch's own generator.

@@ -124,7 +124,7 @@ class EvalResult:
 
 
 class Results(Observer):
-    """Notes how each of N episodes ended.
+    """Counts how each of N episodes ended.
 
     Args:
         names: the scenario's outcomes.

@@ -75,7 +75,7 @@ class StageMoment:
 
 
 class Stage(Rooms):
-    """A room with every step back to its start.
+    """One room whose steps can be taken back.
 
     Args:
         env: what `make` returns.
@@ -116,7 +116,7 @@ class Stage(Rooms):
         return step
 
     def back(self) -> bool:
-        """Take the last step back, chance included; whether there was one."""
+        """Take the last step back, random numbers included; return whether there was one."""
         if self.steps == 0:
             return False
         self.moments.pop()
@@ -128,7 +128,7 @@ class Stage(Rooms):
         return True
 
     def rehearse(self, actions: Mapping[Seat, Int64], look: Callable[[], Any]) -> None:
-        """Play a step that nobody sees, `look` at what came of it, and take it back; it prepares the first one."""
+        """Play a step that observers do not see, call `look`, and take the step back. It prepares the first step."""
         self.env.step(actions[self.own][0])
         look()
         self._restore()

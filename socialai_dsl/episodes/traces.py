@@ -324,7 +324,7 @@ class TracedEpisode:
             env.close()
 
     def close(self) -> None:
-        """Let the environment go."""
+        """Close the environment."""
         self._env.close()
 
     def _typed(self, lines: Sequence[str]) -> Policy:

@@ -1,11 +1,11 @@
-"""Measures what comes of played episodes: the test set, coverage, chance, scripts, and what success is set beside.
+"""Measures played episodes: the test set, coverage, random play, scripts, and reference levels of success.
 
 The page `docs/evaluation.md` shows each of these at work:
 
 * `evaluate_policy(policy, envs, episodes)`: the test set, for a policy and environments of one's own;
   `socialai_dsl.evaluate` plays it with every kind of agent, and returns an `Evaluation`.
-* `coverage(scenarios)`: how often each rule, state, step and outcome came about, and what never did.
-* `baselines(scenario)`: what success is set beside; `play_script` and `play_at_random` measure more closely.
+* `coverage(scenarios)`: how often each rule, state, step and outcome occurred, and which never did.
+* `baselines(scenario)`: reference levels of success; `play_script` and `play_at_random` measure more closely.
 
 `socialai_dsl.episodes` has the players, the loop that plays and what watches it.
 """

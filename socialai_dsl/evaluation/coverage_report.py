@@ -34,7 +34,7 @@ def coverage(
     seed: int = 0,
     clock: Clock | None = None,
 ) -> Coverage:
-    """Let agents play scenarios, and count how often each rule, state, step and outcome came about.
+    """Let agents play scenarios, and count how often each rule, state, step and outcome occurred.
 
     Args:
         scenarios: paths or names; of a suite every member counts.
@@ -139,7 +139,7 @@ class Row:
 
 
 class Coverage:
-    """What came about with which agent, of everything that could.
+    """What occurred with each agent, of everything that could.
 
     Attributes:
         scenarios: what was played. parts: what could come about.

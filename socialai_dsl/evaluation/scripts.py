@@ -49,7 +49,7 @@ class UnsolvedRoom:
 
 @dataclass(frozen=True)
 class ScriptReport:
-    """How a scenario's own script did.
+    """The result of a scenario's own script.
 
     Attributes:
         scenario: what was played, without the script.

@@ -147,7 +147,7 @@ def _thinking(policy: Any, number: int) -> Think:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Test episodes as an agent played them.
+    """Test episodes that an agent played, with their results.
 
     Attributes:
         scenario: as it was asked for. loaded: the same. program: the scenario's.

@@ -84,7 +84,7 @@ class Action(NamedTuple):
 
 
 class Parsed(NamedTuple):
-    """A reply that was read.
+    """The result of reading a reply.
 
     Attributes:
         action: None if the reply holds none.

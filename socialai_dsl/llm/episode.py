@@ -94,7 +94,7 @@ class EpisodeResult:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a reply comes to.
+    """The result of a reply: an action, or an error.
 
     Attributes:
         action: the action to be played; None where no step is.
@@ -184,7 +184,7 @@ class TextSeat(Copied):
         return self._text
 
     def read(self, reply: Reply, stop: str = "") -> Decision:
-        """What a reply comes to.
+        """The result of a reply: an action, or an error.
 
         Args:
             reply: text, or in the mode `tools` a sequence of `ToolCall`.
@@ -307,7 +307,7 @@ class TextSeat(Copied):
 
 
 class Episode(TextSeat):
-    """One room, played in text by whoever replies, episode after episode.
+    """One room that is played in text, episode after episode.
 
     Args:
         scenario: a path, a name or a program.
@@ -370,7 +370,7 @@ class Episode(TextSeat):
         return self.saw(self._rooms, decision, step)
 
     def close(self) -> None:
-        """Let the environment go."""
+        """Close the environment."""
         self.env.close()
 
 

@@ -159,7 +159,7 @@ class ScenarioEnvironment(Environment[Reply, TextObservation, Progress]):
         )
 
     def close(self) -> None:
-        """Let the environment go."""
+        """Close the environment."""
         self._begun, self._ended = False, True
         self._episode.close()
 

@@ -88,9 +88,9 @@ class TextView:
     """Observations as text.
 
     A language model perceives what a trained agent perceives: the text depends on the observation and the lines heard
-    alone, and different observations have different texts. Of the step before it the text says what follows from the
-    two pictures, that a step ahead failed or that one was pushed, and at the end of an episode whether that is a
-    success.
+    alone, and different observations have different texts. About the step before, the text says what follows from
+    the two images: that a step ahead failed, or that the player was pushed; at the end of an episode also whether it
+    is a success.
 
     Args:
         program: of a scenario or suite.

@@ -188,7 +188,7 @@ class Game(Observer):
             self._note("end", **vars(ended), steps=self.steps, reward=self.now.reward)
 
     def undo(self) -> bool:
-        """Take the last step back, chance included; whether there was one."""
+        """Take the last step back, random numbers included; return whether there was one."""
         if not self._stage.back():
             return False
         self._note("undo", t=self.steps)
@@ -292,7 +292,7 @@ class Game(Observer):
         return FinishedEpisode(self.title, actions, self.now.reward, ended, others)
 
     def close(self) -> None:
-        """Let the environment go."""
+        """Close the environment."""
         self._env.close()
 
     def _seen(self, image: NDArray[np.uint8], info: Mapping[str, Any], last: LastStep | None = None) -> str:

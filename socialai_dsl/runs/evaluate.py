@@ -93,9 +93,10 @@ def evaluate(
             JSON or YAML file with a list of layouts, a room each.
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
             episodes and a list of all; reports take it. A language model and a person have one in any case.
-        record: up to how many successes, and how many failures, are filmed there.
-        trials: how many episodes in a row the player remembers, a divisor of `episodes`; results are told by trial, so
-            that they show what can be learnt within a session. A person remembers all of a session in any case.
+        record: the most successes, and the most failures, that are filmed there.
+        trials: how many episodes in a row, a session, the player remembers; a divisor of `episodes`. Results are
+            reported for each trial of a session, so they show what the player learns within one. A person remembers
+            a session in any case.
         seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, a trained agent,
             `llm:MODEL`, or a `Player`; the agent also `rival:NAME`. The one that is tested plays on the seats that are
             left, a language model or a rival on the first of them alone, and results are those of the first.

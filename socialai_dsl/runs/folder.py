@@ -67,7 +67,7 @@ _SECONDS_TO_WAIT: Final = 5.0
 
 @dataclass(frozen=True)
 class Run:
-    """A run, as its folder tells it; the folder may not exist yet.
+    """A run and its folder, which may not exist yet.
 
     Two locks guard it: `only_writer` is held by the process that writes the run's files, `worker_lock` by that of an
     experiment, which starts one such process after another and has to see that a killed one has ended.
@@ -96,7 +96,7 @@ class Run:
 
     @property
     def result(self) -> dict[str, Any] | None:
-        """What came of it, as `result.json` has it; None if it has not come to its end.
+        """Its result, as in `result.json`; None while the run is unfinished.
 
         Raises:
             UnreadableError: the file is damaged.
@@ -105,7 +105,7 @@ class Run:
 
     @property
     def tested(self) -> dict[str, Any]:
-        """What was found on other scenarios: name -> figures."""
+        """Its results on other scenarios: name -> figures."""
         return self._read(TESTS) or {}
 
     @property
@@ -116,7 +116,7 @@ class Run:
 
     @property
     def last_metrics(self) -> Mapping[str, Any] | None:
-        """The last complete row of its figures; None if there is none."""
+        """The last complete row of `metrics.jsonl`; None if there is none."""
         try:
             with open(self.folder / METRICS, "rb") as file:
                 size = file.seek(0, os.SEEK_END)

@@ -1,4 +1,4 @@
-"""Replays: the trace of a played episode, and the page that shows it."""
+"""Traces of played episodes, and the page that replays them."""
 
 from socialai_dsl.traces.document import FORMAT, Thought, Trace, trace_schema
 from socialai_dsl.traces.tracing import Tracer

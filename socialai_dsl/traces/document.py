@@ -215,7 +215,7 @@ class Moment(_Part):
 
 
 class Trace(_Part):
-    """One episode, in the format `socialai-trace/1`. In a notebook it shows itself.
+    """One episode, in the format `socialai-trace/1`. A notebook displays it as a page.
 
     Attributes:
         format: the version of this format.
