@@ -66,23 +66,25 @@ class _Starts(BaseModel):
     frames: int = _flag(
         600_000, "frames to train for: steps of all environments together", result=False, ge=0, le=MOST_FRAMES
     )
-    seed: int = _flag(0, "seeds weights, sampling, shuffling and episodes", ge=0, lt=2**63)
-    envs: int = _flag(256, "environments stepped together (measured)", ge=1, le=65_536)
+    seed: int = _flag(0, "seed of weights, sampling, shuffling and episodes", ge=0, lt=2**63)
+    envs: int = _flag(256, "environments that are stepped together", ge=1, le=65_536)
     net: Name = _flag(
         "fast",
         "fast, relations, speakers, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the "
         "paper's network, update and numbers",
     )
     algorithm: Name = _flag("ppo", "how the network learns: ppo or mine:Algorithm")
-    precision: Literal["float32", "bfloat16"] = _flag("float32", "numbers of the convolutions of `paper`")
+    precision: Literal["float32", "bfloat16"] = _flag(
+        "float32", "number format of the convolutions of the network paper"
+    )
     bonus: Name = _flag(
         "none",
         "exploration bonus: none, lang (new utterances), cell (new kinds of cells), lines (new lines of a speaker) or "
-        "mine:Bonus; the command line takes auto as well, the paper's choice for the scenario",
+        "mine:Bonus; on the command line also auto, the paper's choice for the scenario",
     )
     curriculum: Name = _flag(
         "none",
-        "the choice of a suite's members: none, even, expert, ladder, progress, reverse, a .yaml file of phases or "
+        "which members of a suite are played: none, even, expert, ladder, progress, reverse, a .yaml file of phases or "
         "mine:Curriculum",
     )
     guide: Name = _flag(
@@ -91,14 +93,16 @@ class _Starts(BaseModel):
         "mine:Guide",
     )
     aux: Name = _flag("none", "an auxiliary loss besides the agent's own: none or mine:Loss")
-    guide_share: float = _option(0.5, "first share of the frames, led by the guide (measured)", ge=0, le=1)
+    guide_share: float = _option(
+        0.5, "share of the frames, from the first on, that the guide leads (measured)", ge=0, le=1
+    )
     imitation_coef: float = _coefficient(
         1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0
     )
     aux_coef: float = _coefficient(1.0, "weight of the auxiliary loss", ge=0)
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1, le=65_536)
-    bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
+    bptt: int = _option(0, "steps of back-propagation through time; 0: the whole rollout", ge=0)
     update: Literal["environments", "chunks"] = _option(
         "environments",
         "what a minibatch is made of. environments: whole environments, each distinct frame computed once; chunks: "
@@ -119,7 +123,9 @@ class _Starts(BaseModel):
     entropy_coef: float = _coefficient(0.01, "weight of the entropy, nats (paper)", ge=0)
     max_grad_norm: float = _coefficient(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
     target_kl: float | None = _option(
-        None, "divergence, in the agent's own frames, beyond which a step is undone; null: no limit", gt=0
+        None,
+        "KL divergence in the agent's own frames, nats, beyond which a gradient step is undone; null: no limit",
+        gt=0,
     )
     normalize_advantages: bool = _option(True, "scale advantages to mean 0, deviation 1 (paper: no)")
     loss: Literal["joint", "per_head"] = _option(
@@ -127,16 +133,20 @@ class _Starts(BaseModel):
         "joint: one ratio of the whole action; per_head: a ratio, clip, entropy and value term for each head, "
         "averaged over the four (paper)",
     )
-    bootstrap_timeouts: bool = _option(False, "go on with the value after a time-out (paper: terminal)")
+    bootstrap_timeouts: bool = _option(
+        False, "bootstrap from the value after a time-out (paper: a time-out is terminal)"
+    )
     bonus_c: float = _coefficient(
         7.0,
         "C of the bonus (default: the paper's for the scenario, else 7 for lang, 3 for cell and 0.1 for lines)",
         ge=0,
     )
-    bonus_m: float = _option(50.0, "M of the bonus: 50 pays first visits only (paper)", ge=0)
-    bonus_t: float = _option(0.6, "T of the bonus, as coded its upper bound per step (paper)", gt=0)
+    bonus_m: float = _option(50.0, "M of the bonus; 50 pays for first visits only (paper)", ge=0)
+    bonus_t: float = _option(
+        0.6, "T of the bonus; in the formula as_coded the largest bonus of a step (paper)", gt=0
+    )
     bonus_formula: Literal["as_coded", "as_printed"] = _option(
-        "as_coded", "the bonus of the code that the paper's figures come from, or that of its text"
+        "as_coded", "formula of the bonus: that of the code behind the paper's figures, or that of its text"
     )
     seats: dict[str, list[Name]] = _option(
         {},
@@ -146,17 +156,22 @@ class _Starts(BaseModel):
     )
     recipe: Literal["plain", "guided", "paper"] = _option(
         "plain",
-        "plain: PPO with the numbers above; guided: the script shows, then PPO; paper: PPO from the reward alone, as "
-        "in the paper's experiments",
+        "plain: PPO from the reward alone; guided: imitation of the script, then PPO; paper: as plain, for runs to be "
+        "compared with the paper",
         role="kept",
     )
 
     device: Name = _flag("cpu", "where the network runs: cpu or cuda")
     threads: int = _flag(
-        1, "CPU threads of each minibatch; runs equal to the bit need equally many", ge=1, le=64
+        1,
+        "CPU threads that share each minibatch; results are equal, bit for bit, only for an equal number",
+        ge=1,
+        le=64,
     )
     checkpoint_every: int = _flag(50, "updates between checkpoints", result=False, ge=1, le=MOST_FRAMES)
-    keep_checkpoints: int = _flag(2, "checkpoints kept, the newest ones", result=False, ge=1, le=MOST_FRAMES)
+    keep_checkpoints: int = _flag(
+        2, "how many of the newest checkpoints are kept", result=False, ge=1, le=MOST_FRAMES
+    )
     eval_episodes: int = _flag(500, "episodes of the test set", ge=1, le=1_000_000)
     tensorboard: bool = _option(True, "also write TensorBoard events", result=False)
     wandb: Name | None = _flag(

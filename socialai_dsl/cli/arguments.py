@@ -82,7 +82,7 @@ def add_participant(parser: argparse.ArgumentParser, whose: str = "") -> None:
 
 def add_seats(
     parser: argparse.ArgumentParser,
-    more: str = "; the one who plays has the first seat that is left",
+    more: str = "; the player gets all other seats, a person, a model or a rival only the first of them",
     models: bool = False,
     rivals: bool = True,
 ) -> None:
@@ -111,7 +111,7 @@ def seat_and_player(text: str) -> tuple[str, str]:
 def add_tell(parser: argparse.ArgumentParser) -> None:
     """Declare what players are told before the first observation."""
     group = parser.add_argument_group(
-        "what is told", "to language models and people; other agents read nothing"
+        "instructions", "for language models and people; other agents do not read any"
     )
     group.add_argument(
         "--tell",

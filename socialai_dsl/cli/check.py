@@ -26,10 +26,10 @@ from socialai_dsl.runs.report import require_libraries
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
 EXAMPLES: Final = (
-    ("socialai check gate.yaml", "what it claims"),
+    ("socialai check gate.yaml", "tries what the file claims"),
     (
         "socialai check help --rooms 20 --deep",
-        "also how long success takes, and how often it is possible without the others",
+        "also measures how long success takes, and how often it is possible without the others",
     ),
 )
 

@@ -17,7 +17,10 @@ SUMMARY: Final = (
 )
 
 EXAMPLES: Final = (
-    ("socialai crossplay oracle random --on together/levers_together --episodes 20", "who gets on with whom"),
+    (
+        "socialai crossplay oracle random --on together/levers_together --episodes 20",
+        "finds who succeeds with whom",
+    ),
 )
 _WIDTH: Final = 100  # characters of a line
 

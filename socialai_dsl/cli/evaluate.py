@@ -30,10 +30,16 @@ from socialai_dsl.runs.folder import EVALUATIONS, REPLAY, RESULT
 SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 
 EXAMPLES: Final = (
-    ("socialai evaluate runs/gate --episodes 20", "a run of yours"),
-    ("socialai evaluate oracle --on talkitout --episodes 20", "the script"),
-    ("socialai evaluate shipped:talkitout --rooms seed:1 --episodes 100", "rooms beside the test set"),
-    ("socialai evaluate llm:MODEL --on talkitout --base-url http://localhost:8080/v1", "a language model"),
+    ("socialai evaluate runs/gate --episodes 20", "tests the agent of a run"),
+    ("socialai evaluate oracle --on talkitout --episodes 20", "tests the script"),
+    (
+        "socialai evaluate shipped:talkitout --rooms seed:1 --episodes 100",
+        "tests a trained agent in rooms beside the test set",
+    ),
+    (
+        "socialai evaluate llm:MODEL --on talkitout --base-url http://localhost:8080/v1",
+        "tests a language model",
+    ),
 )
 
 _OPTIONS: Final = (
@@ -53,9 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
         "run",
-        metavar="RUN_DIR",
-        help="the agent: the folder of a run, a checkpoint, shipped:NAME, shipped (the agent of each scenario), "
-        "random, oracle, rival:NAME or llm:MODEL",
+        metavar="AGENT",
+        help="the folder of a run, a checkpoint, shipped:NAME, shipped (the agent of each scenario), random, "
+        "oracle (the script), rival:NAME, llm:MODEL or human",
     )
     parser.add_argument(
         "--on",

@@ -13,9 +13,9 @@ from socialai_dsl.experiments.engines import ENGINES
 SUMMARY: Final = "plan, run and watch the runs that an experiment file declares"
 
 EXAMPLES: Final = (
-    ("socialai experiment plan paper --profile small", "what it will take"),
-    ("socialai experiment run paper --profile small", "do it"),
-    ("socialai experiment status runs/experiments/paper", "how far it is"),
+    ("socialai experiment plan paper --profile small", "lists the runs, and how long they will take"),
+    ("socialai experiment run paper --profile small", "does the runs"),
+    ("socialai experiment status runs/experiments/paper-small", "shows the progress"),
 )
 
 
@@ -51,7 +51,10 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--profile", metavar="NAME", help="profile of the file (default: the file's)")
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="the experiment's folder (default: runs/experiments/NAME)"
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="the experiment's folder (default: runs/experiments/NAME, or NAME-PROFILE)",
     )
     parser.add_argument(
         "--workers", type=positive, metavar="N", help="number of runs at once (default: one for each core)"

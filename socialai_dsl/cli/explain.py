@@ -12,8 +12,8 @@ from socialai_dsl.loader.pages import page_of
 SUMMARY: Final = "explain the code of a finding, or describe a scenario"
 
 EXAMPLES: Final = (
-    ("socialai explain S301", "a finding"),
-    ("socialai explain talkitout", "a scenario in words"),
+    ("socialai explain S301", "explains a finding"),
+    ("socialai explain talkitout", "describes a scenario in words"),
 )
 
 _CODE: Final = re.compile(r"[A-Za-z]\d{3}")

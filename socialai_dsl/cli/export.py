@@ -8,7 +8,7 @@ from socialai_dsl.cli.errors import Exit
 
 SUMMARY: Final = "make a folder of a trained agent to give to others"
 
-EXAMPLES: Final = (("socialai export runs/gate --out my_agent", "weights, figures and a card"),)
+EXAMPLES: Final = (("socialai export runs/gate --out my_agent", "writes weights, figures and a model card"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,8 +14,8 @@ from socialai_dsl.loader.given import STDIN, given_files
 SUMMARY: Final = "format scenario files; comments stay"
 
 EXAMPLES: Final = (
-    ("socialai fmt gate.yaml", "rewrite a file"),
-    ("socialai fmt . --check", "say which are not formatted"),
+    ("socialai fmt gate.yaml", "formats a file"),
+    ("socialai fmt . --check", "names the files that are not formatted"),
 )
 
 

@@ -11,8 +11,8 @@ from socialai_dsl.loader.shipped import ShippedScenario, catalogue
 SUMMARY: Final = "list the scenarios that ship, with their variants and parameters"
 
 EXAMPLES: Final = (
-    ("socialai list", "all that ship"),
-    ("socialai list liar", "those about which a word is said"),
+    ("socialai list", "lists all scenarios that ship"),
+    ("socialai list liar", "lists those whose name or description has the word"),
 )
 
 

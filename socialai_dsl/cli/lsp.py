@@ -8,7 +8,7 @@ from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "run the language server for editors, on standard input and output"
 
-EXAMPLES: Final = (("socialai lsp", "as an editor starts it"),)
+EXAMPLES: Final = (("socialai lsp", "is what an editor starts"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,8 +12,8 @@ from socialai_dsl.errors import UsageError
 SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
 
 EXAMPLES: Final = (
-    ("socialai new gate", "a scenario in which one is asked, with its script and tests"),
-    ("socialai new dance_floor --template imitate", "one in which a dance is repeated"),
+    ("socialai new gate", "writes a scenario in which the agent asks a guide, with its script and tests"),
+    ("socialai new dance_floor --template imitate", "writes one in which the agent repeats a dance"),
 )
 
 

@@ -21,8 +21,8 @@ from socialai_dsl.episodes.players import HUMAN_FOLDER
 SUMMARY: Final = "play a scenario in the terminal"
 
 EXAMPLES: Final = (
-    ("socialai play talkitout", "by the keys of the terminal"),
-    ("socialai play help --view seat", "seeing what the agent sees"),
+    ("socialai play talkitout", "shows the whole room, and takes keys"),
+    ("socialai play help --view seat", "shows only what the agent sees"),
 )
 
 

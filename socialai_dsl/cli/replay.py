@@ -13,8 +13,8 @@ from socialai_dsl.runs.replay import PLAYED, REPLAYED, replay
 SUMMARY: Final = "write a web page to watch episodes step by step, with rules and reasons"
 
 EXAMPLES: Final = (
-    ("socialai replay shipped:help --record 1", "what an agent of yours or ours does"),
-    ("socialai replay gate.yaml --agent oracle --episodes 2", "the script of a scenario"),
+    ("socialai replay shipped:help --record 1", "shows episodes of a trained agent"),
+    ("socialai replay gate.yaml --agent oracle --episodes 2", "shows two episodes of the script"),
 )
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:  # it loads pandas, which is only there if reports were asked 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 
 EXAMPLES: Final = (
-    ("socialai report runs/gate --no-baselines", "one run or several"),
-    ("socialai report runs/minds studies/asking --out report", "with the people of a study"),
+    ("socialai report runs/gate --no-baselines", "reports one run; several folders may be given"),
+    ("socialai report runs/minds studies/asking --out report", "joins the people of a study with the runs"),
 )
 
 
@@ -27,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="DIR",
-        help="the folder of an experiment, or folders of runs; and those of studies, whose people are joined with them",
+        help="the folder of an experiment, or folders of runs; also those of studies, and of what `crossplay --out`, "
+        "`words --out` and `check --pictures` wrote",
     )
     parser.add_argument(
         "--out",

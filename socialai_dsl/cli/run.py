@@ -16,9 +16,9 @@ from socialai_dsl.runs.folder import REPLAY, Run
 SUMMARY: Final = "train an agent on a scenario, test it, and write pictures and figures"
 
 EXAMPLES: Final = (
-    ("socialai-run talkitout", "master it, shown by its script"),
-    ("socialai-run gate.yaml --frames 8192 --eval-episodes 20 --out runs/gate", "a short run"),
-    ("socialai-run talkitout --agent shipped --eval-episodes 20", "a trained agent"),
+    ("socialai-run talkitout", "trains an agent to mastery, first by imitating the script"),
+    ("socialai-run gate.yaml --frames 8192 --eval-episodes 20 --out runs/gate", "trains for a moment"),
+    ("socialai-run talkitout --agent shipped --eval-episodes 20", "tests the agent that ships"),
 )
 
 

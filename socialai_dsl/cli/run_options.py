@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_seats(
         parser,
-        "; several for one seat take turns from game to game; the agent learns on all seats that are left",
+        "; several for one seat take turns from game to game; the agent learns on all other seats",
         rivals=False,
     )
     parser.add_argument(

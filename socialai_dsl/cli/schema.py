@@ -7,7 +7,7 @@ from socialai_dsl.cli.errors import Exit
 
 SUMMARY: Final = "print the JSON Schema of the scenario language, for editors"
 
-EXAMPLES: Final = (("socialai schema", "print it, to be kept in a file"),)
+EXAMPLES: Final = (("socialai schema", "prints the schema; redirect it to a file"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

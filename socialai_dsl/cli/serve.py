@@ -23,7 +23,7 @@ from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "serve a scenario to programs that train language models"
 
-EXAMPLES: Final = (("socialai serve talkitout --protocol openenv", "for OpenEnv's clients"),)
+EXAMPLES: Final = (("socialai serve talkitout --protocol openenv", "serves OpenEnv clients"),)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=port, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
     add_option(parser, "style")
-    add_seats(parser, "; clients have the first seat that is left")
+    add_seats(parser, "; clients play the first seat that is left")
     add_tell(parser)
     parser.add_argument(
         "--sessions",

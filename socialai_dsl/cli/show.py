@@ -11,8 +11,8 @@ from socialai_dsl.diagnostics import printable
 SUMMARY: Final = "print a scenario after `extends` and variants, or its compiled program"
 
 EXAMPLES: Final = (
-    ("socialai show dance+as_coded", "a variant as one file"),
-    ("socialai show gate.yaml --program", "what it is compiled to"),
+    ("socialai show dance+as_coded", "prints a variant as one file"),
+    ("socialai show gate.yaml --program", "prints the compiled program"),
 )
 
 

@@ -14,8 +14,8 @@ from socialai_dsl.studio import FIRST_PORT, MOST_WINDOWS
 SUMMARY: Final = "write, see and play scenarios in the browser"
 
 EXAMPLES: Final = (
-    ("socialai studio", "the scenarios of this folder, and copies of those that ship"),
-    ("socialai studio gate.yaml", "the same folder, with this file open"),
+    ("socialai studio", "opens the scenarios of this folder, and copies of those that ship"),
+    ("socialai studio gate.yaml", "opens this file"),
 )
 
 

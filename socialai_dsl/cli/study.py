@@ -22,10 +22,10 @@ SUMMARY: Final = "let people take part in a study in the browser, and make table
 SIMULATED: Final = "; all of them simulated, in a rehearsal"
 
 EXAMPLES: Final = (
-    ("socialai study rehearse asking.yaml", "simulated participants, in a minute"),
-    ("socialai study rehearse asking.yaml --also rival:first_answer", "and a rival among them"),
-    ("socialai study run asking.yaml --links 2", "serve it, with links for two people"),
-    ("socialai study data asking.yaml", "the tables of what they did"),
+    ("socialai study rehearse asking.yaml", "tries the study with simulated participants, in a minute"),
+    ("socialai study rehearse asking.yaml --also rival:first_answer", "adds a rival to them"),
+    ("socialai study run asking.yaml --links 2", "serves the study, with links for two people"),
+    ("socialai study data asking.yaml", "writes the tables"),
 )
 
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 SUMMARY: Final = "play the tests of scenarios: dialogues that must go as written"
 
 EXAMPLES: Final = (
-    ("socialai test gate.yaml", "its dialogues"),
-    ("socialai test talkitout -k introductions", "those with a word in their name"),
+    ("socialai test gate.yaml", "plays the tests of a scenario"),
+    ("socialai test talkitout -k introductions", "plays those with the word in their name"),
 )
 
 _REPORTS: Final[dict[str, Callable[[Sequence[CheckedInput]], str]]] = {

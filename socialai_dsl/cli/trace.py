@@ -25,8 +25,11 @@ from socialai_dsl.loader.reader import display_name
 SUMMARY: Final = "print one episode step by step: the rules that fired, and why the others did not"
 
 EXAMPLES: Final = (
-    ("socialai trace talkitout", "the script in the first room"),
-    ("socialai trace dance --agent shipped --test-episode 3", "what a trained agent does"),
+    ("socialai trace talkitout", "shows the script in the first room"),
+    (
+        "socialai trace dance --agent shipped --test-episode 3",
+        "shows what the trained agent does in a test episode",
+    ),
 )
 
 

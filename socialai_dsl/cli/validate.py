@@ -16,8 +16,8 @@ from socialai_dsl.loader.given import STDIN
 SUMMARY: Final = "find mistakes in scenario files without playing"
 
 EXAMPLES: Final = (
-    ("socialai validate gate.yaml", "the mistakes of a file"),
-    ("socialai validate . --strict", "of a folder; warnings fail, too"),
+    ("socialai validate gate.yaml", "finds the mistakes of a file"),
+    ("socialai validate . --strict", "checks a folder; warnings fail, too"),
 )
 
 

@@ -17,7 +17,10 @@ from socialai_dsl.runs.words import words
 SUMMARY: Final = "find what players say in which situation, and how much that tells of it"
 
 EXAMPLES: Final = (
-    ("socialai words oracle --on together/reference_game_together --episodes 20", "what words mean"),
+    (
+        "socialai words oracle --on together/reference_game_together --episodes 20",
+        "finds what the words of the scripts mean",
+    ),
 )
 _TABLES: Final = 4
 """Situations that have a table, of those that are told most of."""

@@ -25,7 +25,7 @@ def requested(name: str, profile: str | None, out: Path | None) -> tuple[dict[st
     Args:
         name: the file of an experiment, the name of one that ships, or the folder of one that was started.
         profile: of the file (default: the file's).
-        out: the folder (default: `runs/experiments/NAME`).
+        out: the folder (default: `runs/experiments/NAME`, or `NAME-PROFILE` for a profile that is not the default).
 
     Raises:
         ScenarioError: the file, or a scenario, has mistakes.

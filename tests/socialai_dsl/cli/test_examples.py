@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.cli.main import _COMMANDS, main, run_main
+from socialai_dsl.experiments.request import requested
 
 MODULES = {name: import_module(f"socialai_dsl.cli.{name}") for name in _COMMANDS}
 EXAMPLES = [command for module in MODULES.values() for command, _ in module.EXAMPLES]
@@ -70,3 +71,12 @@ def test_every_help_shows_them(name: str, capsys: pytest.CaptureFixture[str]) ->
     assert "--debug" in shown
     assert MODULES[name].EXAMPLES
     assert all(f"\n  {command}\n      {purpose}\n" in shown for command, purpose in MODULES[name].EXAMPLES)
+
+
+def test_the_progress_is_asked_of_the_folder_that_the_run_makes() -> None:
+    run, status = (
+        next(shlex.split(command) for command in EXAMPLES if f"experiment {action}" in command)
+        for action in ("run", "status")
+    )
+    _, folder = requested(run[3], run[run.index("--profile") + 1], None)
+    assert status[3] == str(folder)
