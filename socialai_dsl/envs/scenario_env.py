@@ -147,9 +147,9 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
     where the scenario shows gestures or hands more. `tokens`, int16 (L,): the words heard since the reset,
     oldest first, as indices into `program.vocabulary`; 0 pads, 1 is an unknown word.
 
-    **Action.** int64 (3 + slots,): body action (the last one is no movement), speak (1) or not (0), template, noun, or
-    in place of the noun a word for each slot of the grammar. Template and noun count only if the agent speaks, a slot
-    only if the template has it. `encode_action` makes one from words.
+    **Action.** int64 (3 + slots,): body action (the last one is no movement), speak (1) or not (0), template, then a
+    word for each slot of the grammar; in most grammars the noun is the one slot. Template and slots count only if the
+    agent speaks, a slot only if the template has it. `encode_action` makes one from words.
 
     **Reward.** A success in step t pays 1 - 0.9 t / horizon, everything else 0, unless the scenario's `reward` and
     `rules` say otherwise.

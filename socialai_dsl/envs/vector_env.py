@@ -46,9 +46,9 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
     where a scenario shows gestures or hands more. `tokens`, int16 (E, L): the words heard since the reset, oldest
     first, as indices into `vocabulary`; 0 pads, 1 is an unknown word.
 
-    **Action.** int64 (E, 3 + slots): body action (the last one is no movement), speak (1) or not (0), template, noun,
-    or in place of the noun a word for each slot of the grammar. Template and noun count only where the agent speaks, a
-    slot only where the template has it.
+    **Action.** int64 (E, 3 + slots): body action (the last one is no movement), speak (1) or not (0), template,
+    then a word for each slot of the grammar; in most grammars the noun is the one slot. Template and slots count only
+    where the agent speaks, a slot only where the template has it.
 
     **Infos.** Empty, except in a step that ends an episode: `success` bool (E,), `outcome` int (E,), an index into
     `outcomes`, and the masks `_success` and `_outcome`, bool (E,), of the episodes that ended. In same-step mode also

@@ -160,7 +160,8 @@ RELATIONS: Final = (
     _test("next_to", doc="at a Manhattan distance of 1; facing does not matter", candidate=True, most=4,
           known=_is_next_to, also=("near", "close_to", "beside", "adjacent", "adjacent_to", "by")),
     _test("in_front_of",
-          doc="on the cell that x, a member, faces; for x in a wall, on the cell one step into the room",
+          doc="on the cell that x, a member, faces; for x in a wall, on the cell one step into the room; "
+              "false of any other object",
           candidate=True, meaning=_related_bodies, most=1, turned=("object",)),
     _test("faces", doc="x is on the cell ahead", turned=("subject",)),
     _test("faces_toward", doc="facing the direction at which face(x) would end", turned=("subject",)),
