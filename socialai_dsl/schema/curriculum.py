@@ -16,11 +16,11 @@ Weight = Annotated[
 
 
 class Ramp(Model):
-    """A weight that changes evenly with the episodes of the phase, and then stays."""
+    """A weight that changes linearly with the episodes of the phase, and then stays."""
 
-    start: Weight = Field(alias="from", description="at the beginning of the phase")
-    to: Weight = Field(description="at the end of the change, and after it")
-    over: int = Field(ge=1, description="episodes that the change takes")
+    start: Weight = Field(alias="from", description="the weight at the beginning of the phase")
+    to: Weight = Field(description="the weight at the end of the change, and after it")
+    over: int = Field(ge=1, description="the number of episodes that the change takes")
 
     def after(self, episodes: int) -> float:
         """The weight after this number of episodes of the phase."""
@@ -32,16 +32,18 @@ def _form(value: Any) -> str:
 
 
 class Group(Model):
-    """Some members of a suite, and how likely one of them is played; among them the suite's own chances count."""
+    """Some members of a suite, and the probability of the group; within it the suite's own probabilities count."""
 
     only: dict[Word, Labels] = Field(
-        default_factory=dict, description="parameter: value or values; leaves that have all of them"
+        default_factory=dict,
+        description="parameter: value or values; the leaves that have one of the values of every parameter",
     )
     without: dict[Word, Labels] = Field(
-        default_factory=dict, description="parameter: value or values; leaves that do not have all of them"
+        default_factory=dict,
+        description="parameter: value or values; all leaves but those that `only` would choose",
     )
     members: ListOf[Annotated[MemberName, Holds("label")]] | None = Field(
-        None, description="names of members, instead of leaves"
+        None, description="names of members, in place of leaves"
     )
     weight: Annotated[
         Annotated[Weight, Tag("number")] | Annotated[Ramp, Tag("ramp")], Discriminator(_form)

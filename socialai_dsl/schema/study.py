@@ -69,9 +69,12 @@ class Practice(Model):
     episodes: int = Field(2, ge=1, le=100, description="episodes of a round")
     until: Criterion | None = Field(None, description="the criterion; without one there is one round")
     rounds: int = Field(
-        3, ge=1, le=20, description="the most rounds; then the study goes on, and the data say so"
+        3,
+        ge=1,
+        le=20,
+        description="the largest number of rounds; then the study goes on, and the data say so",
     )
-    tell: Tell | None = Field(None, description="as of a block")
+    tell: Tell | None = Field(None, description="what participants are told of the task, as for a block")
 
 
 class Question(Model):
@@ -79,7 +82,9 @@ class Question(Model):
 
     id: Word = Field(description="its name in the data; each question of a study has its own")
     ask: Told = Field(description="the question")
-    kind: Literal["text", "choice", "scale"] = Field("text", description="how it is answered")
+    kind: Literal["text", "choice", "scale"] = Field(
+        "text", description="the kind of answer: words, a choice, or a number of a scale"
+    )
     options: Annotated[ListOf[Option], Field(min_length=2, max_length=100)] | None = Field(
         None, description="of a choice: what can be chosen"
     )
@@ -110,34 +115,34 @@ class Block(Model):
     """Episodes of a scenario that count."""
 
     name: Word | None = Field(
-        None, description="its name in the data; default the scenario's name and its number"
+        None, description="its name in the data; default: the scenario's name and its number"
     )
     scenario: MemberName = Field(description="the scenario, with variants and parameters")
-    episodes: int = Field(ge=1, le=TEST_SET, description="how many are played")
+    episodes: int = Field(ge=1, le=TEST_SET, description="the number of episodes")
     rooms: Rooms = Field(
         "test",
-        description="`test`: the rooms of the test set, in which agents are evaluated, beginning with number 0, or "
-        "behind those that blocks above it with the same scenario have; or a list of their numbers",
+        description="`test`: rooms of the test set, in which agents are evaluated, from number 0 on, after those "
+        "of earlier blocks with the same scenario; or a list of room numbers",
     )
     shuffle: bool = Field(
-        False, description="whether each participant plays the rooms in an order of their own"
+        False, description="whether each participant plays the rooms in a random order of their own"
     )
     view: Literal["both", "picture", "words"] = Field(
         "both", description="the form in which participants get what their seat sees"
     )
     seats: Seats | None = Field(
         None,
-        description="member of the cast: `person`, `script`, `random`, `nobody`, shipped:NAME, a checkpoint or run "
-        "folder, relative to this file, llm:MODEL, or of the agent rival:NAME; the agent is a person unless said "
-        "otherwise, the others follow their scripts",
+        description="member of the cast: its player: `person`, `script`, `random`, `nobody`, shipped:NAME, a "
+        "checkpoint or run folder relative to this file, llm:MODEL, for the agent also rival:NAME; default: the agent "
+        "is a person, the others follow their scripts",
     )
     wait: Seconds = Field(
         120, description="seconds after which a seat is filled by `stands_in` if no other person has come"
     )
     stands_in: StandIns = Field(
         "script",
-        description="who takes the seat of a person who does not come, or leaves: as in `seats`, for all such seats "
-        "alike, or by member of the cast",
+        description="the player on the seat of a person who does not come, or leaves, as in `seats`: one for all such "
+        "seats, or by member of the cast",
     )
     act_within: Seconds = Field(
         60,
@@ -145,16 +150,20 @@ class Block(Model):
         "the script plays to the end of the episode",
     )
     away: Annotated[int, Field(ge=2, le=600)] = Field(
-        10, description="seconds without a sign of a participant's page, with which it counts as left"
+        10, description="seconds without a sign of a participant's page after which it counts as left"
     )
     tell: Tell | None = Field(
-        None, description="what is told of the task; default the scenario's `instructions` if it has some"
+        None,
+        description="what participants are told of the task; default: the scenario's `instructions` "
+        "if it has some",
     )
     feedback: Literal["none", "outcome"] = Field(
-        "outcome", description="whether participants are told after an episode if it was a success"
+        "outcome",
+        description="`outcome`: participants are told after an episode whether it was a success; "
+        "`none`: they are not",
     )
     groups: Annotated[ListOf[Annotated[int, Field(ge=1, le=100)]], Field(min_length=1)] | None = Field(
-        None, description="numbers of the groups that play it; default all"
+        None, description="numbers of the groups that play it; default: all"
     )
     questions: Questions = Field((), description="asked after the block")
 
@@ -164,11 +173,11 @@ class Assign(Model):
 
     order: Literal["fixed", "balanced"] = Field(
         "fixed",
-        description="`fixed`: as in the file; `balanced`: by a balanced Latin square, in which each block "
-        "stands at each place, and behind each other block, equally often",
+        description="`fixed`: as in the file; `balanced`: by a balanced Latin square, in which each block stands "
+        "equally often at each place, and after each other block",
     )
     groups: int | None = Field(
-        None, ge=1, le=100, description="how many; default as many as there are orders"
+        None, ge=1, le=100, description="the number of groups; default: as many as there are orders"
     )
 
 
@@ -178,8 +187,12 @@ class Pay(Model):
     currency: Annotated[str, StringConstraints(pattern=r"^[A-Z]{3}$"), Holds("spelt")] = Field(
         "EUR", description="three letters, as of ISO 4217"
     )
-    base: float | int = Field(0, ge=0, le=100_000, description="for everybody who comes to the end")
-    bonus: float | int = Field(0, ge=0, le=10_000, description="for each successful episode that counts")
+    base: float | int = Field(
+        0, ge=0, le=100_000, description="the amount for everybody who comes to the end"
+    )
+    bonus: float | int = Field(
+        0, ge=0, le=10_000, description="the amount for each successful episode that counts"
+    )
 
 
 class Exclude(Model):
@@ -200,10 +213,12 @@ class Recruit(Model):
 
     id: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$"), Holds("spelt")] = Field(
         "PROLIFIC_PID",
-        description="the parameter of the address that says who comes; kept in a file of its own",
+        description="the parameter of the address with the participant's id, which is kept in a file "
+        "of its own",
     )
     on_return: Literal["resume", "refuse"] = Field(
-        "resume", description="whether who comes a second time by the same id goes on, or is refused"
+        "resume",
+        description="a participant who comes again with the same id goes on (`resume`), or is refused",
     )
 
 
@@ -213,10 +228,10 @@ class End(Model):
     code: Annotated[str, StringConstraints(min_length=1, max_length=80), Holds("label")] | None = Field(
         None, description="the completion code"
     )
-    say: Told | None = Field(None, description="what is said there besides thanks")
+    say: Told | None = Field(None, description="a text that is shown besides thanks")
     link: (
         Annotated[str, StringConstraints(pattern=r"^https://\S+$", max_length=1000), Holds("spelt")] | None
-    ) = Field(None, description="where to go then, such as the platform's page of completion")
+    ) = Field(None, description="the address to go to then, such as the platform's page of completion")
 
 
 class Study(Model):
@@ -237,9 +252,9 @@ class Study(Model):
     blocks: Annotated[ListOf[Block], Field(min_length=1, max_length=50)] = Field(description="what is played")
     model: Asked | None = Field(None, description="how language models on seats are asked")
     assign: Assign = Field(Assign(), description="who plays the blocks in which order")
-    participants: int | None = Field(None, ge=1, le=100_000, description="how many may take part")
+    participants: int | None = Field(None, ge=1, le=100_000, description="the largest number of participants")
     questions: Questions = Field((), description="asked at the end")
-    pay: Pay | None = Field(None, description="what is paid")
+    pay: Pay | None = Field(None, description="the payment")
     exclude: Exclude = Field(Exclude(), description="whose data are marked as excluded")
     recruit: Recruit = Field(Recruit(), description="how participants come")
     end: End = Field(End(), description="the last page")

@@ -100,6 +100,8 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
         if objects is None or known is None or not can_lie_inside(resolver, objects):
             message = f"`{quoted(node)}`: it never lies inside anything"
             hint = "an object is put into another with `inside:`, or by the effect `x.move_into(box)`"
+            if entity in hands.carryable(resolver):
+                hint = "ask who carries it: `ann.carries(x)`; `inside: box` puts it into another object"
             raise resolver.fail("S204", message, node, scope, hint=hint)
     assert known is not None, "internal: looked at above"
     return FieldOf(Type("entity", *known), who, "inside")

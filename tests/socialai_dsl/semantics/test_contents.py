@@ -33,3 +33,11 @@ def test_effects_that_cannot_be(examine, effect, code):
 def test_where_nothing_can_lie(examine, inside):
     objects = {**BOXES, "toy": {"type": "ball", "inside": inside}}
     assert [d.code for d in examine(objects=objects, let=LET).diagnostics] == ["S204"]
+
+
+def test_what_is_only_carried_lies_in_nothing_and_the_cure_asks_about_hands(examine):
+    """`inside: guide` puts it into hands, so `inside:` is no cure for `x.inside`."""
+    objects = {"coin": {"type": "ball", "carryable": True, "inside": "guide"}}
+    (found,) = examine(objects=objects, outcome=[{"success": "coin.inside == guide"}]).diagnostics
+    assert found.code == "S204"
+    assert "`ann.carries(x)`" in found.hint
