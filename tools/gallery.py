@@ -79,11 +79,14 @@ SUITES: Final = (
 )
 
 _OF_FOLDER: Final = {
-    "classics": ("Classic experiments", "[What they are after, and how they were measured](classics.md)."),
+    "classics": (
+        "Classic experiments",
+        "[What each experiment tests, and how it was measured](classics.md).",
+    ),
     "novel": ("New tasks", "[How agents were trained on them](mastery.md#school-and-novel-scenarios)."),
     "together": (
         "Several players",
-        "Chance plays the agent's seat beside the scripts of the others; the agents learnt all seats at once "
+        "Chance plays the agent's seat beside the scripts of the others; the agents were trained on all seats at once "
         "([what self-play finds](together.md)).",
     ),
 }
@@ -249,27 +252,33 @@ _TOP: Final = """\
 
 <!-- Written by `make gallery`; change tools/gallery.py or a scenario's file and run it again. -->
 
-Every scenario that ships. *Watch* opens a page on which the scenario's script plays three episodes, with every rule and
-why it fired; it needs a browser and nothing else. `make docs` writes these pages beside this one.
+Every scenario that ships. *Watch* plays three episodes of the scenario's script in your browser, with the reason of
+each rule. `make docs` writes these pages beside this one.
 
-Success in per cent of episodes: **chance** acts at random, the **rival** is the best of the strategies that
-[lack the skill](checks.md#rivals), the **script** is the scenario's own, the **agent** was trained after it had
-imitated the script. An agent's figure leads to its conditions, that of chance to the data sheet."""
+Figures are success in per cent of episodes. **Chance** acts at random, the **rival** is the best of the strategies that
+[lack the skill](checks.md#rivals), the **script** is the scenario's own, and the **agent** learnt from demonstrations
+by the script. An agent's figure links to its conditions, that of chance to the data sheet.
+[Names and variants](#names-and-variants) explains names such as `school/boxes+color`."""
 
 _END: Final = """\
 ## Names and variants
 
-A name includes the folder, `classics/director_task`. Each scenario has a variant `+oracle`, a frame that plays the
-agent: a demonstration that it can be solved. Any of them takes `+unsocial` (the others neither seen nor heard),
-`+marked` (tokens say who speaks), `+seats` (whoever has a frame
-[can be played](partners.md#the-other-side-of-a-scenario)) and `+alike` (so, and no picture tells which of them one
-is). Those of the paper have `+as_coded`, the differences of the code released with the paper;
-`social_env?split=test` has a role that training never had.
+A name includes the folder, as in `classics/director_task`. `socialai list` has every name with its variants and
+parameters.
 
-The caretaker of the School shows which thing is right in five ways, `school/boxes+pointing`, `+color`, `+feedback`,
-`+emulation` and `+scaffolding`. `school/boxes+alone` has no distractor, `+asocial` no caretaker, `+asocial+alone`
-neither; `doors_alone` and `marbles_alone` are files of their own. The agent takes the other role in
-`school/lever_door_swapped`. `socialai list` has every name with its variants and parameters.
+| variant | what it changes |
+|---|---|
+| `+oracle` | the agent follows the script, which shows that the scenario can be solved; all but the suites have it |
+| `+unsocial` | the agent neither sees nor hears the others |
+| `+marked` | tokens in the dialogue say who speaks |
+| `+seats` | every member of the cast [can be played](partners.md#the-other-side-of-a-scenario) |
+| `+alike` | as `+seats`, and a player's picture does not show which seat it has |
+| `+as_coded` | the scenario as in the code released with the paper; those of the paper have it |
+
+`social_env?split=test` has a role that never occurs in training. In the School, the caretaker shows which thing is
+right in five ways: `school/boxes+pointing`, `+color`, `+feedback`, `+emulation` and `+scaffolding`.
+`school/boxes+alone` has no distractor, `+asocial` no caretaker, `+asocial+alone` neither; `doors_alone` and
+`marbles_alone` are separate files. In `school/lever_door_swapped` the agent takes the other role.
 
 The scenarios of the paper, the classics and those of several players have [data sheets](scenarios/README.md) with
 pictures, skills and figures.
@@ -294,8 +303,8 @@ def _groups() -> Iterator[tuple[str, str, Sequence[Line]]]:
         yield title, remark, [Line(name) for name in names if name.startswith(f"{folder}/")]
     yield (
         "The SocialAI School",
-        "One line for each problem. Where one of two things is right, the caretaker says its colour; without a cue "
-        "nothing tells ([the other cues](#names-and-variants)).",
+        "Where one of two things is right, the caretaker names its colour. This is one of "
+        "[five cues](#names-and-variants); without a cue, the agent can only guess.",
         _SCHOOL,
     )
 
