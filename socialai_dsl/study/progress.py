@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of, stand_ins_of
+from socialai_dsl.schema.study import Question
 from socialai_dsl.semantics.study import least_filled, shuffled
 from socialai_dsl.study.log import Event
 
@@ -121,6 +122,17 @@ class Progress:
     def stage(self, person: Participant) -> Stage:
         """What a participant does now."""
         return self.stages(person)[person.stage]
+
+    def questions(self, person: Participant) -> tuple[Question, ...]:
+        """What a participant is asked at their stage, which is `asked`."""
+        _, block = self.stage(person)
+        return self.study.questions if block == PRACTICE else self.study.blocks[block].questions
+
+    def gone_on_from(self, person: Participant) -> int:
+        """How many episodes a participant has played and gone on from."""
+        game = self.games.get(person.game or "")
+        there = game is not None and game.episode is not None and game.episode.ended is not None
+        return person.played - there
 
     def rooms(self, game: Game) -> tuple[int, ...]:
         """The rooms that a game plays, in this order; of practice those of the present round."""

@@ -272,7 +272,7 @@ class StudyServer:
             "code": code,
             "language": self._loaded.study.language,
             "words": self._words,
-            "done": self.live.gone_on_from(person),
+            "done": self.live.progress.gone_on_from(self.live.progress.people[person]),
         }
         await self._take_part(socket, person, joined)
 

@@ -16,7 +16,9 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main
 from socialai_dsl.frontend import load_study
+from socialai_dsl.study.live import Live
 from tests.socialai_dsl.reporting.page_reader import Page
+from tests.socialai_dsl.study.participants import Clock, loaded_study, meet, pass_time, run
 
 pytest.importorskip("websockets", reason="studies need the extra studio")
 pytest.importorskip("uvicorn", reason="studies need the extra studio")
@@ -230,7 +232,6 @@ def test_a_rehearsal_says_that_it_is_one_in_its_log_and_its_data(
     study, log = str(place / "asking.yaml"), str(place / "asking_rehearsal")
     assert main(["study", "status", study, "--out", log]) == 0
     assert "5 began, 4 finished; all of them simulated, in a rehearsal" in capsys.readouterr().out
-    from socialai_dsl.study.live import Live
 
     with pytest.raises(
         ValueError, match="holds a rehearsal, and simulated participants stay apart from people"
@@ -280,22 +281,36 @@ def test_two_people_in_one_room_stand_beside_those_who_play_both_seats(tmp_path:
 
 
 def test_episodes_with_stand_ins_are_conditions_of_their_own(tmp_path: Path) -> None:
-    from socialai_dsl.study.rehearsal import rehearse
-
-    (tmp_path / "together.yaml").write_text(TOGETHER.replace("away: 600", "away: 5"), encoding="utf-8")
+    """Two people play an episode; then one leaves, who does not count, and the other plays two with a stand-in."""
     (tmp_path / "log").mkdir()
-    rehearsal = rehearse(
-        load_study(tmp_path / "together.yaml"), tmp_path / "log", 4, speed=100, kinds=("script", "leaving")
-    )
-    tables = rehearsal.data.tables
-    counted = {row["participant"] for row in tables["participants"] if not row["excluded"]}
-    stayed = [row for row in tables["episodes"] if row["participant"] in counted and not row["left"]]
-    with_stand_ins = [row for row in stayed if row["stood_in"]]
-    assert with_stand_ins, "somebody left in the middle of an episode"
+    loaded = loaded_study(TOGETHER.replace("away: 600", "away: 5"), tmp_path)
+
+    async def play() -> None:
+        clock = Clock()
+        live = Live(loaded, tmp_path / "log", clock)
+        people = await meet(live)
+        for number in range(3):
+            while not all(one.now.get("ended") for one in people.values()):
+                for one in people.values():
+                    await one.act("left")
+            for one in people.values():
+                await one.go()
+            if number == 0:
+                for one in people.values():
+                    await one.act("left")
+                leaves = people.pop("jill")
+                assert leaves.page is not None
+                live.go(leaves.page)
+                await pass_time(live, clock, 6, *people.values())
+        await live.close()
+
+    run(play)
     assert main(["report", str(tmp_path / "log"), "--no-baselines", "--out", str(tmp_path / "report")]) == 0
-    minds = {row["condition"]: int(row["episodes"]) for row in rows(tmp_path / "report" / "minds.csv")}
-    in_part = [count for name, count in minds.items() if "in part by stand-ins)" in name]
-    assert (sum(in_part), sum(minds.values())) == (len(with_stand_ins), len(stayed))
+    minds = {row["condition"]: row["episodes"] for row in rows(tmp_path / "report" / "minds.csv")}
+    assert {name.partition(" / ")[2]: count for name, count in minds.items()} == {
+        "people (jill by a person)": "1",
+        "people (jill by a person, in part by stand-ins)": "2",
+    }
 
 
 # -- what is wrong with a study ----------------------------------------------------------------------------------------

@@ -12,8 +12,9 @@ import pytest
 
 from socialai_dsl.checking.studies import LoadedStudy
 from socialai_dsl.frontend import load_study
-from socialai_dsl.study.live import Live, Page
+from socialai_dsl.study.live import Live
 from socialai_dsl.study.messages import Screen
+from socialai_dsl.study.pages import Page
 
 ALONE = """\
 study: alone
@@ -98,6 +99,24 @@ class Taking:
 
 async def newcomer(live: Live) -> Taking:
     return await Taking(live, await live.join()).come()
+
+
+async def meet(live: Live) -> dict[str, Taking]:
+    """Two who play together, by seat."""
+    people = [await newcomer(live) for _ in range(2)]
+    for one in people:
+        await one.go()
+    await live.tick()
+    (game,) = live.progress.games.values()
+    return {seat: next(one for one in people if one.person == who) for seat, who in game.seats.items()}
+
+
+async def pass_time(live: Live, clock: Clock, seconds: int, *there: Taking) -> None:
+    for _ in range(seconds):
+        clock.now += 1
+        for one in there:
+            await one.beat()
+        await live.tick()
 
 
 async def until(one: Taking, kind: str) -> Screen:

@@ -128,14 +128,14 @@ def test_an_episode_that_has_ended_is_told_as_the_tables_have_it(feedback: str, 
         assert live.agree(person, LAB, simulated=False)
         one = Taking(live, person)
         one.page = await live.come(person, one.screens.append, lambda code, why: None, elsewhere=True)
-        records, done = [], [live.gone_on_from(person)]
+        records, done = [], [live.progress.gone_on_from(live.progress.people[person])]
         for moves in (["left", "forward", "done"], ["done"]):
             for move in moves:
                 await one.act(move)
             records.append(one.now["record"])
-            done.append(live.gone_on_from(person))
+            done.append(live.progress.gone_on_from(live.progress.people[person]))
             await one.go()
-            done.append(live.gone_on_from(person))
+            done.append(live.progress.gone_on_from(live.progress.people[person]))
         assert one.now["do"] == "end"
         await live.close()
         return records, done

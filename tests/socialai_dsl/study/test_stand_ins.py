@@ -23,7 +23,7 @@ from socialai_dsl.study.players import agent_of
 from socialai_dsl.study.replay import study_data
 from socialai_dsl.trainer.shipped import agents_folder
 from tests.socialai_dsl.llm.endpoint import Stub, endpoint
-from tests.socialai_dsl.study.participants import Clock, Taking, loaded_study, newcomer, run
+from tests.socialai_dsl.study.participants import Clock, Taking, loaded_study, meet, newcomer, pass_time, run
 
 HELP = """\
 study: stand_ins
@@ -47,24 +47,6 @@ blocks:
 
 def steps(folder: Path) -> list[dict[str, Any]]:
     return [event for event in read_log(folder / FILE) if event["event"] == "step"]
-
-
-async def meet(live: Live) -> dict[str, Taking]:
-    """Two who play together, by seat."""
-    people = [await newcomer(live) for _ in range(2)]
-    for one in people:
-        await one.go()
-    await live.tick()
-    (game,) = live.progress.games.values()
-    return {seat: next(one for one in people if one.person == who) for seat, who in game.seats.items()}
-
-
-async def pass_time(live: Live, clock: Clock, seconds: int, *there: Taking) -> None:
-    for _ in range(seconds):
-        clock.now += 1
-        for one in there:
-            await one.beat()
-        await live.tick()
 
 
 async def until_true(found: Any) -> None:
