@@ -50,7 +50,7 @@ VALUE_SYNONYMS: Final = {other: word.name for word in _VALUES for other in word.
 
 RESERVED: Final = frozenset(
     [word.name for word in SIGNATURES if word.name not in ("name", "kind", "index", "cell")]
-    + ["speaker", "objects", "believes", "permuted"]
+    + ["speaker", "objects", "cast", "believes", "permuted"]
     + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
     + [FINISHED, *COLORS, *DIRECTIONS, *ACTIONS, *SIDES]
     + ["and", "or", "not", "in", "where", "to", "if", "else", "true", "false", "room", "agent"]
@@ -67,6 +67,7 @@ NAMES: Final = {
     "W": "the width of the room in cells, walls included",
     "H": "the height of the room in cells, walls included",
     "objects": "the group of all objects",
+    "cast": "the group of all members of the cast, the agent first",
     "cells": "the group of all floor cells of the room",
     "colors": "the group of the colours: red, green, blue, purple, yellow, grey",
     "nouns": "the group of the nouns of the grammar",

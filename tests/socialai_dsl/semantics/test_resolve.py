@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.semantics.terms import may_find_nothing
+from socialai_dsl.semantics.words import NAMES
 
 
 def test_uses_that_disagree_are_a_mistake(mistakes):
@@ -51,3 +52,8 @@ def test_of_what_is_not_found_nothing_follows_though_it_could_be_one_thing_alone
     sections = {"objects": objects, "tables": {"only": {"door": 1}}}
     assert may_find_nothing(outcome_term(asked.format("first(d in doors where d.open)"), **sections))
     assert not may_find_nothing(outcome_term(asked.format("exit"), **sections))
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_no_object_is_called_like_a_name_that_is_always_there(mistakes, name):
+    assert "S213" in {line[:4] for line in mistakes(objects={name: {"type": "ball"}})}
