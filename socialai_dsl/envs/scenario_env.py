@@ -540,12 +540,12 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels of the picture."""
+        """Names of the channels of the image."""
         return self._table.merged.channels
 
     @property
     def looks(self) -> dict[str, tuple[str, ...]]:
-        """The looks that the picture shows, each with its words."""
+        """The looks that the image shows, each with its words."""
         return words_of_looks(self._table.programs)
 
     def plain_text(self) -> str:

@@ -75,7 +75,7 @@ class LastStep(NamedTuple):
 
     Attributes:
         movement: the word for the body action; None for no movement.
-        before: the picture before it, as in the observation.
+        before: the image before it, as in the observation.
         success: whether the episode has ended in success; None while it goes on.
     """
 

@@ -129,7 +129,7 @@ class Program:
         vocabulary: word of each token id; 0 pads, 1 is unknown.
         source_map: one span (or None) for each instruction.
         labels: heading of the block that starts at a pc.
-        looks: name and words of each look that the picture shows.
+        looks: name and words of each look that the image shows.
         names_shown: whether a line begins with the name of who says it.
         tones: words of the look that is heard before a line, in brackets.
     """
@@ -211,7 +211,7 @@ class Program:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the channels of its picture."""
+        """Names of the channels of its image."""
         carrying = bool(self.header(Header.FLAGS) & Flag.SHOWS_CARRYING)
         gestures = GESTURES[: self.header(Header.CHANNELS) - carrying - len(LOOKS)]
         shown = {*LOOKS, *gestures, *(["carrying"] if carrying else [])}
