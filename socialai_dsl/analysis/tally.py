@@ -57,7 +57,7 @@ class Tally:
 
 
 def parts_of(checked: CheckedScenario) -> Iterator[Part]:
-    """Everything in a scenario that can come about."""
+    """Everything in a scenario that can occur."""
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
             if step.duration != 0:  # else it is left out

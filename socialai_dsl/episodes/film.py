@@ -57,7 +57,7 @@ class RecordedEpisode:
         ending: the same as the scenario's file says it, and where; None if that is not known.
         success: whether that counts as success.
         reward: sum of the rewards.
-        seats: of each seat, where there are several, what was done there and what it came to.
+        seats: of several seats, the actions and the result of each.
     """
 
     title: str

@@ -57,7 +57,7 @@ class Step:
 
 
 class Observer:
-    """Watches rooms. The methods do nothing here; an observer has those that it needs."""
+    """Base of what watches rooms. Its methods do nothing; override those that you need."""
 
     def began(self, rooms: Rooms, begun: Bools) -> None:
         """Episodes have begun where `begun`, bool (E,); `rooms` has their numbers and first observations."""

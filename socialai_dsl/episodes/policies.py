@@ -223,7 +223,7 @@ class Streams:
         return np.stack([stream.gumbel(size=width) for stream in self._streams]).astype(np.float32)
 
     def state(self) -> Int64:
-        """Where all streams are, int64 (E, 13)."""
+        """The state of all streams, int64 (E, 13)."""
         return (
             np.array([_place_in(stream) for stream in self._streams], np.uint64)
             .reshape(-1, 13)
@@ -231,7 +231,7 @@ class Streams:
         )
 
     def load_state(self, state: Int64) -> None:
-        """Go on from there, with as many environments."""
+        """Continue from what `state()` returned, with the same number of environments."""
         self._streams = [_stream_at(place) for place in np.ascontiguousarray(state).view(np.uint64)]
 
     def _require(self, count: int) -> None:

@@ -79,7 +79,7 @@ def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _parts(scenario: str) -> list[Part]:
-    """Everything in a scenario that can come about."""
+    """Everything in a scenario that can occur."""
     return [part for checked in scenarios_of(load(scenario)) for part in parts_of(checked)]
 
 
@@ -142,8 +142,8 @@ class Coverage:
     """What occurred with each agent, of everything that could.
 
     Attributes:
-        scenarios: what was played. parts: what could come about.
-        tallies: agent -> what did, and how many episodes it played.
+        scenarios: what was played. parts: what could occur.
+        tallies: agent -> what occurred, and how many episodes it played.
         planned: how many episodes there should be. interrupted: whether Ctrl-C ended the play.
     """
 
@@ -154,7 +154,7 @@ class Coverage:
         self.planned, self.interrupted = 0, False
 
     def add(self, agent: str, played: Tally) -> None:
-        """Add what came about with an agent."""
+        """Add what occurred with an agent."""
         known = self.tallies.setdefault(agent, played)
         if known is not played:
             known.times.update(played.times)
@@ -171,18 +171,18 @@ class Coverage:
 
     @property
     def percent(self) -> float:
-        """How much of everything came about; 100 of nothing."""
+        """The percentage of parts that occurred; 100 if there are none."""
         rows = self.rows
         return 100 * sum(row.total > 0 for row in rows) / len(rows) if rows else 100.0
 
     def summary(self) -> dict[str, tuple[int, int]]:
-        """Kind -> how many came about, of how many."""
+        """Kind -> the number that occurred, and the number of all."""
         rows = self.rows
         found = {kind: [row.total > 0 for row in rows if row.part.kind == kind] for kind in _KINDS}
         return {kind: (sum(came), len(came)) for kind, came in found.items() if came}
 
     def lines(self) -> list[str]:
-        """The report as text, what never came about last."""
+        """The report as text; parts that never occurred come last."""
         rows = self.rows
         agents = list(self.tallies)
         width = max((len(_place(row.part)) for row in rows), default=0)
