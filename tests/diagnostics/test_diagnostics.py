@@ -27,6 +27,7 @@ from socialai_dsl.checking.formats import CheckedInput, as_json, as_sarif
 from socialai_dsl.diagnostics import CODES, Diagnostic, render_text
 from socialai_dsl.evaluation.scenario_tests import play_tests
 from socialai_dsl.frontend import CheckResult, check
+from socialai_dsl.schema.files import FILES
 from socialai_dsl.source import Source
 from tests.quick import one_in
 from tests.slips import SLIPS, write_mistakes
@@ -276,3 +277,8 @@ def test_every_code_has_its_page_and_its_line_in_the_index() -> None:
     assert {path.stem for path in PAGES.glob("[SW]*.md")} == set(CODES)
     index = (PAGES / "index.md").read_text(encoding="utf-8")
     assert re.findall(r"^\| \[([SW]\d+)\]\(\1\.md\) \| (.+) \|$", index, re.MULTILINE) == list(CODES.items())
+
+
+def test_the_page_of_an_unknown_kind_names_all_kinds_of_files() -> None:
+    head = parts("S108")[0]
+    assert [kind for kind in FILES if f"`{kind}`" not in head] == []
