@@ -77,6 +77,21 @@ def test_an_agent_is_shipped_again_under_another_program(agents: Path, tmp_path:
     assert all(torch.equal(value, before.tensors[name]) for name, value in after.tensors.items())
 
 
+@pytest.mark.thorough("plays the test four times")
+def test_an_agent_of_many_forms_ships_for_the_scenario(run: Path, tmp_path: Path) -> None:
+    """Help stands for a suite, and the other role for a scenario that it draws forms of."""
+    assert "help_as_helper: " in ship(run, tmp_path, COMMIT, "help_as_helper", ["help"])
+    agent = tmp_path / "help_as_helper"
+    text = (agent / "README.md").read_text(encoding="utf-8")
+    assert "Trained again by `socialai-run help --recipe guided --frames 1500" in text
+    assert "| trained on | `help` |" in text
+    rate = content(agent / "result.json")["forms"]["help"]["success_rate"]
+    assert f"| `help` | {rate:.1%}, 95% interval" in text
+    assert main(["evaluate", str(agent), "--device", "cpu", "--json", "--episodes", "20"]) == 0
+    ship(agent, tmp_path)
+    assert (agent / "README.md").read_text(encoding="utf-8") == text
+
+
 def test_an_agent_that_no_longer_does_what_its_run_says_is_refused(run: Path, tmp_path: Path) -> None:
     changed = shutil.copytree(run, tmp_path / "run")
     result = content(changed / "result.json")

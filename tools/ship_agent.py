@@ -18,6 +18,10 @@ It refuses, with exit code 1, where
 An agent that ships can be shipped again, from its own folder: `python tools/ship_agent.py agents/talkitout`. This is
 for a compiler that gives the same scenario another program, so that the agent's digest is renewed; the agent must
 still do what its card says.
+
+An agent that was trained on many forms of a scenario ships for the scenario, with its success in other forms:
+
+    python tools/ship_agent.py RUN --plays dance --form dance+as_coded
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -149,13 +153,21 @@ def provenance(run: Path, commit: str | None) -> dict[str, str]:
     return {"date": datetime.fromtimestamp(ended, UTC).date().isoformat(), "commit": commit}
 
 
-def ship(run: Path, folder: Path, commit: str | None = None) -> str:
+def ship(
+    run: Path,
+    folder: Path,
+    commit: str | None = None,
+    plays: str | None = None,
+    forms: Sequence[str] = (),
+) -> str:
     """Make `folder/NAME` of a run, and return what is to be said of it.
 
     Args:
         run: a finished run's folder, or that of an agent that ships.
         folder: where the agents are that ship.
         commit: the commit whose code trained the agent; None: see `provenance`.
+        plays: the scenario for which it ships; None: that of its training.
+        forms: other scenarios whose test it plays as well, for its card.
 
     Raises:
         Refused: the agent is not fit to ship.
@@ -163,6 +175,10 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
     """
     config, loaded, checkpoint = finished_agent(run)
     result = read_json(run / RESULT)
+    trained_on = result.get("trained_on")
+    if plays is not None:
+        trained_on, loaded = config.scenario, socialai_dsl.load(plays)
+        config = config.model_copy(update={"scenario": plays})
     name = shipped_name(loaded, config.scenario)
     if config.own_files or ":" in config.net:
         raise Refused(f"{run}: was trained with code of one's own, which does not ship")
@@ -176,7 +192,8 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
         place.mkdir()
         checkpoints.write_file(place / WEIGHTS, small)
         single = evaluate(Player(str(run)), name, EPISODES)
-        require_same(single, result["eval"])
+        if plays is None:
+            require_same(single, result["eval"])
         half = evaluate(Player(str(place)), name, EPISODES)
         compared = result.get("half_precision") or {
             **compare(single.result.success, half.result.success),
@@ -189,6 +206,8 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
             "trained": result.get("trained") or provenance(run, commit),
             "half_precision": compared,
         }
+        told |= {} if trained_on is None else {"trained_on": trained_on}
+        told |= {"forms": _forms(place, forms)} if forms else {}
         write_agent(place, config, loaded, small, told, PREFIX + name)
         size = sum(file.stat().st_size for file in place.rglob("*") if file.is_file())
         if size > LARGEST:
@@ -204,6 +223,14 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
         f"({compared['identical']} played alike, {compared['only_single']} lost, {compared['only_half']} won, "
         f"p = {compared['p']}); {size:,} bytes"
     )
+
+
+def _forms(agent: Path, forms: Sequence[str]) -> dict[str, Any]:
+    """The success of an agent in the test of other scenarios, with its interval."""
+    figures = {form: evaluate(Player(str(agent)), form, EPISODES).figures() for form in forms}
+    return {
+        form: {key: one[key] for key in ("success_rate", "success_interval")} for form, one in figures.items()
+    }
 
 
 def index(folder: Path) -> str:
@@ -246,11 +273,22 @@ def main() -> int:
         "--commit",
         help="whose code trained the agent (default: the newest on this branch when the run began)",
     )
+    parser.add_argument(
+        "--plays", metavar="SCENARIO", help="for which it ships (default: that of its training)"
+    )
+    parser.add_argument(
+        "--form",
+        action="append",
+        default=[],
+        dest="forms",
+        metavar="SCENARIO",
+        help="another one whose test it plays, for its card (repeatable)",
+    )
     arguments = parser.parse_args()
     folder = agents_folder()
     folder.mkdir(exist_ok=True)
     try:
-        print(ship(arguments.run, folder, arguments.commit))
+        print(ship(arguments.run, folder, arguments.commit, arguments.plays, arguments.forms))
     except Refused as refusal:
         print(f"refused: {refusal}", file=sys.stderr)
         return 1

@@ -218,8 +218,8 @@ def restore_net(
 ) -> ActorCritic:
     """Build the checkpoint's network for environments described by `spec`.
 
-    Word embeddings follow the spelling; words the checkpoint never met keep fresh ones, and a warning lists the
-    differences.
+    Word embeddings follow the spelling; words the checkpoint never met keep fresh ones, and a warning lists
+    them.
 
     Args:
         checkpoint: result of `read`.
@@ -245,18 +245,18 @@ def restore_net(
     model = build_net(name, spec, meta.config.seed, meta.config.precision, folder)
     weights = _widened(checkpoint.part("net"), model.state_dict())
     if list(spec.vocabulary) != meta.vocabulary:
-        _warn_of_words(set(meta.vocabulary), set(spec.vocabulary))
+        _warn_of_words(set(spec.vocabulary) - set(meta.vocabulary))
         _move_words(weights, model, meta.vocabulary)
     _check_weights(weights, model.state_dict())
     model.load_state_dict(weights)
     return model
 
 
-def _warn_of_words(old: set[str], new: set[str]) -> None:
-    parts = [f"new words it never met: {', '.join(sorted(new - old))}"] if new - old else []
-    parts += [f"words not used here: {', '.join(sorted(old - new))}"] if old - new else []
-    detail = "; ".join(parts) or "the same words in another order"
-    warnings.warn(f"the checkpoint's vocabulary differs ({detail})", stacklevel=4)
+def _warn_of_words(new: set[str]) -> None:
+    """Warn of words that the agent never met; those that it knows are moved, and those it does not need do no harm."""
+    if new:
+        said = f"the checkpoint's vocabulary differs (new words it never met: {', '.join(sorted(new))})"
+        warnings.warn(said, stacklevel=4)
 
 
 def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list[str]) -> None:

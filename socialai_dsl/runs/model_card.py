@@ -43,6 +43,7 @@ def model_card(
         weights: the checkpoint, as seen from its folder.
     """
     name = f"{scenario_folder_name(config.scenario)}-{config.net}-s{config.seed}"
+    trained_on = result.get("trained_on", config.scenario)
     parts = [
         f"---\n{yaml.safe_dump(_front_matter(name, config, result), sort_keys=False, allow_unicode=True)}---",
         f"# {name}",
@@ -50,12 +51,13 @@ def model_card(
         f"It was trained for {result['frames']:,} frames with the network `{config.net}`.",
         "## Evaluation",
         _evaluation(result["eval"]),
+        *_forms(result.get("forms", {})),
         "## How to load it",
         f"{_place(agent)}, with `pip install 'socialai-dsl[train]'`:",
         f"```python\n{_snippet(config, agent)}```",
         "## Training",
         _table(("", ""), _facts(config, result, weights)),
-        f"Trained again by `{_command(config)}`. The hyper-parameters:",
+        f"Trained again by `{_command(config, trained_on)}`. The hyper-parameters:",
         _table(
             ("name", "value"),
             [
@@ -65,7 +67,10 @@ def model_card(
             ],
         ),
         "## Limits",
-        _LIMITS.format(partners=_partners_tested(config, result["eval"])),
+        _LIMITS.format(
+            rooms=_ROOMS_OF_ONE if trained_on == config.scenario else _ROOMS_OF_MANY.format(trained_on),
+            partners=_partners_tested(config, result["eval"]),
+        ),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -80,10 +85,16 @@ def _kind(config: RunConfig) -> str:
 
 _LIMITS: Final = """\
 * One agent, trained with one seed. The interval says how exactly its own success rate is known, not how other seeds do.
-* It was trained and tested on rooms drawn from this one program. Elsewhere it plays only where actions, utterances and
+* {rooms} Elsewhere it plays only where actions, utterances and
   pictures have the same sizes, and words it never met mean nothing to it.
 * {partners}
 * Its figures hold for the way of choosing actions that is named above."""
+
+
+_ROOMS_OF_ONE: Final = "It was trained and tested on rooms drawn from this one program."
+_ROOMS_OF_MANY: Final = (
+    "It was trained on the forms that `{}` draws, and tested on rooms of the scenario itself."
+)
 
 
 def _partners_tested(config: RunConfig, evaluation: Mapping[str, Any]) -> str:
@@ -141,10 +152,21 @@ def _evaluation(figures: Mapping[str, Any]) -> str:
     )
 
 
+def _forms(forms: Mapping[str, Any]) -> list[str]:
+    """Success in other forms of the scenario, where it was measured."""
+    rows = []
+    for form, figures in forms.items():
+        low, high = figures["success_interval"]
+        rows.append((f"`{form}`", f"{figures['success_rate']:.1%}, 95% interval {low:.1%} to {high:.1%}"))
+    return [_table(("in other forms", "success"), rows)] if rows else []
+
+
 def _facts(config: RunConfig, result: Mapping[str, Any], weights: str) -> list[tuple[str, str]]:
     versions = ", ".join(f"{package} {version}" for package, version in result["versions"].items())
+    trained_on = result.get("trained_on")
     rows = [
         ("scenario", f"`{config.scenario}`"),
+        *([("trained on", f"`{trained_on}`")] if trained_on else []),
         ("program (SHA-256)", f"`{result['program_sha256']}`"),
         ("weights", f"`{weights}`" + _precision(result.get("half_precision"))),
         ("frames", f"{result['frames']:,}"),
@@ -202,7 +224,7 @@ def _quoted(text: str) -> str:
     return json.dumps(text)
 
 
-def _command(config: RunConfig) -> str:
+def _command(config: RunConfig, scenario: str) -> str:
     """The command that trains the same agent, also where recipe and machine would choose frames and threads."""
     usual = configure(config.recipe, net=config.net, scenario=config.scenario).model_dump()
     always = ("frames", "threads")
@@ -221,7 +243,7 @@ def _command(config: RunConfig) -> str:
     partners = [f"--seat {seat}={name}" for seat, names in config.seats.items() for name in names]
     return " ".join(
         [
-            *("socialai-run", config.scenario, *partners),
+            *("socialai-run", scenario, *partners),
             *(word for name, value in given.items() for word in _typed(name, value)),
         ]
     )

@@ -440,7 +440,7 @@ def test_words_are_moved_by_spelling(session: Session, tmp_path: Path) -> None:
     envs = EchoEnvs(2)
     envs.program.vocabulary = ["<pad>", "<unk>", "say", "novel", "voice", *envs.vocabulary[4:-1]]
     old = session.actor.net.dialogue.embedding.weight
-    with pytest.warns(UserWarning, match=r"never met: novel; words not used here: di"):
+    with pytest.warns(UserWarning, match=r"never met: novel\)"):
         net = restored(path, envs)
     new = net.dialogue.embedding.weight
     assert torch.equal(new[2], old[3])
@@ -495,8 +495,7 @@ def test_another_order_of_the_same_words_changes_nothing_but_the_rows(
     path = write(tmp_path, session.checkpoint())
     envs = EchoEnvs(2)
     envs.program.vocabulary = [*envs.vocabulary[:2], *reversed(envs.vocabulary[2:])]
-    with pytest.warns(UserWarning, match="same words in another order"):
-        net = restored(path, envs)
+    net = restored(path, envs)
     old = session.actor.net.dialogue.embedding.weight
     assert torch.equal(net.dialogue.embedding.weight[2:], old[2:].flip(0))
 
