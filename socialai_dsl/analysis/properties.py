@@ -55,7 +55,7 @@ RIVAL_ROOMS: Final = 500
 """In how many rooms a rival plays, at least."""
 _PORTIONS: Final = 8
 """Of how many parts of the rooms one is looked at first, where all of them may take too long."""
-_OF_ITSELF: Final = "a success comes of itself, without the agent"
+_OF_ITSELF: Final = "a success happens while the agent does nothing"
 
 
 class Trial:
@@ -284,10 +284,10 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
     rests = int((~idle).sum())
     if not rests:
-        said = f"it rests on nothing: in all of {rooms_text(effort.rooms)} {_OF_ITSELF}"
+        said = f"no room tests it: in all of {rooms_text(effort.rooms)} {_OF_ITSELF}"
         return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
     if idle.any():
-        said += f"; in {int(idle.sum())} of them a success comes of itself"
+        said += f"; in {int(idle.sum())} of them {_OF_ITSELF}"
     solved = dict(enumerate(won.tolist()))
     return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests, so=solved)
 
@@ -300,10 +300,10 @@ def _rival(trial: Trial, plan: PropertyPlan) -> Report:
     if trial.scripted is not None:
         said += f", the scenario's own script {trial.solved.mean():.0%} of {rooms_text(len(trial.solved))}"
     if trial.rooms.solved_by_idling.all():
-        said = f"it rests on nothing: in all of {rooms_text(trial.effort.rooms)} {_OF_ITSELF}"
+        said = f"no room tests it: in all of {rooms_text(trial.effort.rooms)} {_OF_ITSELF}"
         return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
     if trial.scripted is not None and trial.solved.mean() <= plan.share:
-        said = f"it rests on nothing: the skill does not help more than that; {said}"
+        said = f"no room tests it: the script does not solve more; {said}"
         return Report(Verdict.FAILS, len(won), 0, 0, (), said, 0)
     verdict = Verdict.HOLDS if won.mean() <= plan.share + 1e-9 else Verdict.FAILS
     against = tuple(np.flatnonzero(won).tolist()[:SHOWN])
@@ -331,7 +331,7 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     against = sorted({*(peek.index for peek in found.peeks), *divided})
     held = rooms - len(against)
     if found.pairs == found.groups == 0:
-        said = "it rests on nothing: no two rooms look alike at first"
+        said = "no room tests it: no two rooms look alike at first"
         return Report(Verdict.FAILS, rooms, 0, 0, (), said, 0)
     said = f"in {held} of {rooms_text(rooms)} the script acts on what it has perceived alone"
     said += f" ({found.pairs} pairs of rooms that look alike and differ in one draw, "
@@ -430,7 +430,7 @@ def _told(compared: Sequence[TwinComparison], trial: Trial, plan: PropertyPlan, 
         absent = [
             k for k in range(effort.rooms) if len(trial.rooms.missing(k, plan.members)) == len(plan.members)
         ]
-        said = f"it rests on nothing: none of {pairs} pairs of episodes differ in anything"
+        said = f"no room tests it: none of {pairs} pairs of episodes differ in anything"
         said += f"; in {rooms_text(len(absent))} none of the members is there" if absent else ""
     verdict = Verdict.FAILS if leaks or not cued else Verdict.HOLDS
     held = effort.rooms - len(against) if verdict is Verdict.HOLDS or leaks else 0
@@ -441,16 +441,16 @@ def _told(compared: Sequence[TwinComparison], trial: Trial, plan: PropertyPlan, 
 # --- without some of the cast ---
 
 _KNOWN: Final = {
-    GuessingVerdict.GUESSES: "{} {} nothing but a guess",
-    GuessingVerdict.KNOWS: "in {} it can be known without",
-    GuessingVerdict.TELLS_APART: "in {} something else tells, so an agent may do without: name that too, or hide it",
+    GuessingVerdict.GUESSES: "in {} an agent can only guess",
+    GuessingVerdict.KNOWS: "in {} an agent can do without them",
+    GuessingVerdict.TELLS_APART: "in {} something else is a cue, so they may not be needed: name it, too, or hide it",
     GuessingVerdict.UNDECIDED: "in {} it is undecided",
 }
 _NO_SUCCESS: Final = "no success is possible"
 _NEAR: Final = 8_000
 """The number of states in which a success without the members is looked for first."""
 
-_ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
+_ALWAYS_A_GUESS: Final = "an agent can only guess even with them"
 
 
 def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
@@ -468,9 +468,7 @@ def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
             tally.held if answer is GuessingVerdict.GUESSES else tally.undecided if open_ else tally.against
         ).append(room)
     said = ", ".join(
-        words.format(rooms_text(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
-        for answer, words in _KNOWN.items()
-        if counted[answer]
+        words.format(rooms_text(counted[answer])) for answer, words in _KNOWN.items() if counted[answer]
     )
     said += "" if needing.told is None else f"; {needing.told}"
     return tally.report(said + ("" if exact else _AS_TRIED), 1.0 if plan.share is None else plan.share)
@@ -681,7 +679,7 @@ def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     return tally.report(said, 1.0 if plan.share is None else plan.share)
 
 
-_AMONG_OTHERS: Final = "; {} of them look like some that differ in several draws"
+_AMONG_OTHERS: Final = "; {} of them look at first like rooms that differ in several draws"
 
 
 def _undecided(known: RoomKnown) -> RoomKnown:
@@ -702,7 +700,7 @@ def _said_of(found: Collection[RoomKnown]) -> str:
         f"{name} stays hidden {_until(steps)} in {rooms_text(len(steps))}" for name, steps in hidden.items()
     ]
     if known:
-        parts.append(f"in {rooms_text(len(known))} all can be known, within {steps_text(max(known))}")
+        parts.append(f"in {rooms_text(len(known))} everything can be known, within {steps_text(max(known))}")
     if nothing:
         parts.append(f"in {rooms_text(nothing)} success depends on nothing hidden")
     undecided = sum(one.known is Knowability.UNDECIDED for one in found)

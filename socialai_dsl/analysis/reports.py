@@ -38,7 +38,7 @@ class Report:
         rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
         against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
         said: what was found, in words.
-        rests: on how many of the rooms it rests; the others say nothing about it.
+        rests: how many of the rooms test it.
         pairs: on how many pairs of episodes, where pairs are compared.
         acts: what is done in the first of `against`, as it is typed, where that is known.
         so: of each room that says something, where rooms are looked at one by one: whether it is so there, or whether a
@@ -92,9 +92,9 @@ class Evidence:
             return Report(Verdict.UNDECIDED, 0, 0, 0, (), _NO_TIME, 0)
         if not self.rests:
             silent = tuple(sorted(room for rooms in self.void.values() for room in rooms))[:SHOWN]
-            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"it rests on nothing: {self._why()}", 0)
+            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"no room tests it: {self._why()}", 0)
         if self.void:
-            said += f"; the others say nothing: {self._why()}"
+            said += f"; the others do not test it: {self._why()}"
         held, undecided = len(self.held), len(self.undecided)
         verdict = by_share(held, undecided, self.rests, share)
         against = tuple(sorted((*self.against, *self.undecided)))[:SHOWN]

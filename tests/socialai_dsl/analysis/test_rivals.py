@@ -78,7 +78,7 @@ def test_a_success_without_the_agent_says_nothing_of_a_rival(tmp_path: Path) -> 
     path = written(tmp_path, text + RIVALS + "check:\n  - {rival: always_red, at_most: 0.7}\n")
     (_, found), *_ = check_scenario(load(path), path, Effort(5)).tried
     assert found.verdict is Verdict.FAILS
-    assert "it rests on nothing" in found.said
+    assert "no room tests it" in found.said
 
 
 def test_a_rival_that_is_no_worse_than_the_script_says_nothing(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_a_rival_that_is_no_worse_than_the_script_says_nothing(tmp_path: Path) -
     path = written(tmp_path, text + RIVALS + "check:\n  - {rival: always_red, at_most: 0.7}\n")
     (_, found), *_ = check_scenario(load(path), path, Effort(5)).tried
     assert found.verdict is Verdict.FAILS
-    assert "it rests on nothing: the skill does not help" in found.said
+    assert "no room tests it: the script does not solve more" in found.said
 
 
 @pytest.mark.parametrize(
