@@ -31,8 +31,8 @@ def plan_text(figures: Mapping[str, Any], each: bool) -> str:
     known = [] if seconds is None else [clock(seconds)]
     time = " and ".join(known + ([f"an unknown time (of {unknown} runs, see --measure)"] if unknown else []))
     lines.append(f"{len(figures['runs'])} runs, {figures['workers']} at once: {time} left")
-    besides = f"{clock(figures['seconds_besides'])} a run are counted for starting and testing"
-    lines.append(f"speeds are those of {'; '.join(sources)}; {besides}" if sources else besides)
+    besides = f"starting and testing add {clock(figures['seconds_besides'])} a run"
+    lines.append(f"speeds are from {'; '.join(sources)}; {besides}" if sources else besides)
     return "\n".join(lines)
 
 

@@ -62,7 +62,7 @@ class Speeds:
         if net in self._cached:
             return Speed(self._cached[net], "a short measurement on this machine")
         if net in USUAL_SPEEDS:
-            return Speed(USUAL_SPEEDS[net], "what is usual for this network")
+            return Speed(USUAL_SPEEDS[net], "a typical figure of this network")
         return None
 
     def is_from_runs(self, condition: Mapping[str, Any]) -> bool:

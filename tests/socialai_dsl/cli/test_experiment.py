@@ -61,7 +61,7 @@ def test_a_plan(file: Path, capsys: Capture) -> None:
         "chance         0      0       -         15 s       waiting\n"
         "\n"
         "5 runs, 2 at once: 22 s and an unknown time (of 2 runs, see --measure) left\n"
-        "speeds are those of what is usual for this network; 15 s a run are counted for starting and testing\n"
+        "speeds are from a typical figure of this network; starting and testing add 15 s a run\n"
     )
 
 
@@ -91,7 +91,7 @@ def test_a_plan_for_programs(file: Path, capsys: Capture) -> None:
         "success_rate": None,
         "message": None,
         "frames_per_second": 5000.0,
-        "speed_from": "what is usual for this network",
+        "speed_from": "a typical figure of this network",
         "seconds": 7215.0,
     }
     assert not (file.parent / "runs").exists(), "a plan changes nothing"

@@ -41,7 +41,7 @@ def test_nothing_is_known_of_an_unusual_network(tmp_path):
 
 def test_what_is_usual_then_what_was_measured_then_what_ran_here(tmp_path):
     asked = run(tmp_path, "dance")
-    assert known(Speeds([asked]), asked) == (5000, "what is usual for this network")
+    assert known(Speeds([asked]), asked) == (5000, "a typical figure of this network")
     remember("fast", 4000)
     remember("paper", 100)
     assert known(Speeds([asked]), asked) == (4000, "a short measurement on this machine")
@@ -74,4 +74,4 @@ def test_a_spoilt_cache_is_no_cache(tmp_path):
     remember("fast", 4000)
     (tmp_path / "cache" / "socialai-dsl" / "speeds.json").write_text('{"fast": "quick", "paper": -1')
     asked = run(tmp_path, "dance")
-    assert known(Speeds([]), asked) == (5000, "what is usual for this network")
+    assert known(Speeds([]), asked) == (5000, "a typical figure of this network")
