@@ -238,8 +238,8 @@ def record_start(run_dir: Path, update: int, config: RunConfig) -> None:
         changed = [f"{name} {last.get(name)} -> {one}" for name, one in now.items() if last.get(name) != one]
         if changed:
             warnings.warn(
-                f"the run resumes under other conditions ({', '.join(changed)}), so its weights may differ from those of a "
-                "run that never stopped",
+                f"the run resumes under other conditions ({', '.join(changed)}), so its weights may differ from "
+                "those of a run that never stopped",
                 stacklevel=4,
             )
     began, frames = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), update * config.frames_per_update

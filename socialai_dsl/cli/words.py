@@ -10,7 +10,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import columns, json_text
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.errors import OptionError
-from socialai_dsl.evaluation.words import SeatWords, Situation
+from socialai_dsl.evaluation.words import MOST_VALUES, SeatWords, Situation
 from socialai_dsl.runs.folder import WORDS
 from socialai_dsl.runs.words import words
 
@@ -59,7 +59,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     for seat, said in found.seats.items():
         print("", *map(printable, _seat(seat, said)), sep="\n")
     if found.left_out:
-        print(f"\nnot told apart, as there are too many values: {', '.join(found.left_out)}")
+        print(f"\nleft out, with more than {MOST_VALUES} values: {', '.join(found.left_out)}")
     if arguments.out is not None:
         print(f"\nwritten to {arguments.out}")
     return Exit.GOOD
@@ -83,11 +83,11 @@ def _seat(seat: str, found: SeatWords) -> Iterator[str]:
     untold = [one.name for one in found.situations if not one.more_than_chance]
     if untold:
         yield ""
-        yield f"  tells no more than chance of {', '.join(untold)}"
+        yield f"  tells no more than by chance about {', '.join(untold)}"
     if found.topographic is not None:
         similarity, p = found.topographic
         yield ""
-        yield f"  like is called alike: topographic similarity {similarity:.2f} (p {p:.3f})"
+        yield f"  similar situations get similar messages: topographic similarity {similarity:.2f} (p {p:.3f})"
 
 
 def _table(situation: Situation, messages: list[str]) -> Iterator[str]:

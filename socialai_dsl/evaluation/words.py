@@ -33,7 +33,7 @@ SILENCE: Final = "(nothing)"
 _DRAWN: Final = ("let", "one_of", "state")
 """Where `describe` has what is drawn, and what the scenario itself remembers."""
 _LEVEL: Final = 0.05
-_MOST_VALUES: Final = 32
+MOST_VALUES: Final = 32
 """Values of something that has more are not told apart."""
 
 Value = str
@@ -281,7 +281,7 @@ def _values(
         whole = np.array([row + row[-1:] * (longest - len(row)) for row in texts])
         values, numbers = np.unique(whole, return_inverse=True)
         numbers = numbers.reshape(whole.shape).astype(np.int64)
-        if len(values) > _MOST_VALUES:
+        if len(values) > MOST_VALUES:
             left_out.append(name)
         elif len(values) > 1:
             same = next((k for k, one in enumerate(columns) if _alike(one.numbers, numbers)), None)
@@ -296,7 +296,7 @@ def _values(
 
 def _together(drawn: Sequence[_Column]) -> _Column | None:
     """All draws at once, as what is said may depend on several of them; None without several, and of too many."""
-    if len(drawn) < 2 or np.prod([len(one.values) for one in drawn]) > _MOST_VALUES:
+    if len(drawn) < 2 or np.prod([len(one.values) for one in drawn]) > MOST_VALUES:
         return None
     rows = np.stack([one.numbers for one in drawn], axis=-1)
     kinds, numbers = np.unique(rows.reshape(-1, len(drawn)), axis=0, return_inverse=True)

@@ -74,8 +74,8 @@ def test_a_seat_that_speaks_has_a_table_and_a_silent_one_a_sentence(tmp_path: Pa
         ["green", "0.00", "1.00", *["0.00"] * 7],
     ]
     assert "meant = meant.color: the messages tell 0.90 of 1.00 bits" in page.text
-    assert "It tells no more than chance of hat." in page.text
-    assert "topographic similarity of 0.75 (p 0.020)" in page.text
+    assert "It tells no more than by chance about hat." in page.text
+    assert "Topographic similarity is 0.75 (p 0.020): 1 if" in page.text
     assert "It says the same everywhere: (nothing)." in page.text
     assert "too many values: clock" in page.text
     rows = list(csv.DictReader((out / "words.csv").read_text().splitlines()))
