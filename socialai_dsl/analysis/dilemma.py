@@ -54,20 +54,20 @@ class Schelling:
     def verdict(self) -> str:
         """Whether it is a dilemma, and why, in a sentence."""
         least, most = min(self.gains), max(self.gains)
-        together = f"if all cooperate each is paid {self.cooperators[-1]:.3f}, if nobody does {self.defectors[0]:.3f}"
+        together = f"each is paid {self.cooperators[-1]:.3f} if all cooperate, {self.defectors[0]:.3f} if nobody does"
         if self.is_dilemma:
             gain = f"{least:.3f}" if most - least < 0.0005 else f"{least:.3f} to {most:.3f}"
-            return f"a dilemma: to defect gains {gain}, however many others cooperate, and {together}"
+            return f"a dilemma: defecting gains {gain}, however many others cooperate, and {together}"
         if least <= _LEAST:
             others = self.gains.index(least)
-            told = f"while {others} of {len(self.gains) - 1} others cooperate, to defect gains {least:.3f}"
+            told = f"if {others} of {len(self.gains) - 1} others cooperate, defecting gains {least:.3f}"
             return f"no dilemma: {told}"
         return f"no dilemma: {together}"
 
     def __str__(self) -> str:
         most = len(self.cooperators) - 1
         told = [
-            f"while {others} of {most} others cooperate, to cooperate pays {c:.3f} and to defect {d:.3f}"
+            f"if {others} of {most} others cooperate, cooperating pays {c:.3f} and defecting {d:.3f}"
             for others, (c, d) in enumerate(zip(self.cooperators, self.defectors, strict=True))
         ]
         return "; ".join([self.verdict, *told])

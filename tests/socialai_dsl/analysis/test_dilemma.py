@@ -66,10 +66,10 @@ def test_what_only_looks_like_one(tmp_path: Path, own: int, others: int, why: st
         (
             -10,
             20,
-            "a dilemma: to defect gains 0.200, however many others cooperate, and if all cooperate each is paid 0.600",
+            "a dilemma: defecting gains 0.200, however many others cooperate, and each is paid 0.600 if all cooperate",
         ),
-        (10, 20, "no dilemma: while 0 of 2 others cooperate, to defect gains -0.200"),
-        (-10, 2, "no dilemma: if all cooperate each is paid -0.120, if nobody does 0.000"),
+        (10, 20, "no dilemma: if 0 of 2 others cooperate, defecting gains -0.200"),
+        (-10, 2, "no dilemma: each is paid -0.120 if all cooperate, 0.000 if nobody does"),
     ],
 )
 def test_the_verdict_says_why(tmp_path: Path, own: int, others: int, verdict: str) -> None:
