@@ -802,6 +802,6 @@ class _Run:
             name, source, when = declaration.label, declaration.source, ""
             if path in grown and registers.is_set(path):
                 when = " in an episode"
-                hint = f"bound what it is set to: `set: {{{name}: min({name} * 2, 100)}}`"
+                hint = f"bound what it is set to: `set: {{{name}: min(..., 100)}}`"
             span = places.key_span(source if source[-1] == name else source[:-1])
             self._findings.too_large(f"`{name}`", far, span, when, hint=hint)
