@@ -313,7 +313,8 @@ def _extended(library: Library, root: Node, kind: str, path: Path, chain: tuple[
         raise library.error("S108", message, entry.value_span())
     assert isinstance(base.tree.children, dict), "internal: a file is a mapping"
     assert isinstance(root.children, dict), "internal: a file is a mapping"
-    for own in ("abstract", "tests"):  # what a base says of itself alone
+    # What a base says of itself alone; tests are all that a file of tests has.
+    for own in ("abstract",) if kind == "tests_of" else ("abstract", "tests"):
         base.tree.children.pop(own, None)
     del root.children["extends"]
     merged = merge(base.tree, root)

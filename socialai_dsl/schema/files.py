@@ -58,6 +58,18 @@ class StudyFile(Study):
     extends: FileName | None = _EXTENDS
 
 
+class ObjectLibraryFile(ObjectLibrary):
+    """Object types in a file, perhaps built on another."""
+
+    extends: FileName | None = _EXTENDS
+
+
+class GrammarLibraryFile(GrammarLibrary):
+    """Utterance grammars in a file, perhaps built on another."""
+
+    extends: FileName | None = _EXTENDS
+
+
 class VariantFile(Model):
     """A patch: what is removed from a scenario or suite, then set, then added."""
 
@@ -90,6 +102,7 @@ class TestsFile(Model):
     tests: dict[Word, DialogueTest] = Field(
         min_length=1, description="name: a dialogue that `socialai test` plays"
     )
+    extends: FileName | None = _EXTENDS
 
 
 FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
@@ -97,7 +110,7 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
     "npc": (NpcFile,),
     "variant": (VariantFile,),
     "suite": (SuiteFile,),
-    "library": (ObjectLibrary, GrammarLibrary),
+    "library": (ObjectLibraryFile, GrammarLibraryFile),
     "experiment": (ExperimentFile,),
     "curriculum": (CurriculumFile,),
     "study": (StudyFile,),
@@ -109,5 +122,5 @@ FILES: Final[dict[str, tuple[type[BaseModel], ...]]] = {
 def model_of_file(root: Mapping[str, object]) -> type[BaseModel] | None:
     """The model of a file with these keys; None if nothing says which it is."""
     if root.get("library") == "grammars":
-        return GrammarLibrary
+        return GrammarLibraryFile
     return next((models[0] for kind, models in FILES.items() if kind in root), None)

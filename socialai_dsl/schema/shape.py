@@ -28,7 +28,6 @@ from socialai_dsl.schema.scenario import (
     LANGUAGE_TAG,
     NOT_BLANK,
     FirstRule,
-    Npc,
     Register,
     Scenario,
     State,
@@ -486,7 +485,7 @@ class _Report:
         span = self._places.key_span(finding.path)
         owner = model_at(self._model, finding.path[:-1])
         known = keys_of(owner) if owner is not None else []
-        if owner in (Scenario, Npc):
+        if len(finding.path) == 1 and "variant" not in known:
             known = [*known, _EXTENDS]
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if owner is ThenRule and key == "do":

@@ -16,8 +16,8 @@ _FORMS = {
     "npc": "NpcFileWithParameters",
     "suite": "SuiteFile",
     "variant": "VariantFile",
-    "objects": "ObjectLibrary",
-    "grammars": "GrammarLibrary",
+    "objects": "ObjectLibraryFile",
+    "grammars": "GrammarLibraryFile",
 }
 _WORDS = "agent door color exit wizard peer duty waiting on left jump a1 _x x".split()
 _TEXTS = [

@@ -189,6 +189,15 @@ def test_mistakes_are_findings_in_every_format_and_nothing_is_played(capsys: Cap
         assert empty == ""
 
 
+def test_a_file_of_tests_that_builds_on_another_has_its_tests_too(capsys: Capture) -> None:
+    Path("first.tests.yaml").write_text(test_with("    play: [{do: left}]\n"))
+    Path("more.tests.yaml").write_text(
+        "extends: first.tests.yaml\ntests_of: lodge.yaml\ntests: {more: {play: [{do: right}]}}\n"
+    )
+    assert main(["test", "more.tests.yaml"]) == 0
+    assert "2 tests: 2 passed" in capsys.readouterr().out
+
+
 def test_wrong_usage_ends_with_2() -> None:
     assert main(["test", "nonesuch"]) == 2
     assert main(["test", "talkitout_oracle"]) == 2  # it has none
