@@ -68,7 +68,7 @@ CODES: Final[dict[str, str]] = {
     "S315": "files of `one_of` that differ where they must not",
     "S316": "no success or no room is possible",
     "W317": "a definition or frame that nothing uses",
-    "S318": "a register that nothing is ever put into",
+    "S318": "a register that nothing sets",
     "W319": "a condition that always holds",
     "S320": "an action that the agent does not have",
     "W321": "a gesture or look that is not in the picture",

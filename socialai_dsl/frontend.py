@@ -141,7 +141,7 @@ def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str
             message = f"`{ignore.code}` is an error here, and only warnings can be ignored"
             bag.warning(UNUSED, message, ignore.span)
         elif ignore.span.file == judged and ignore.key not in silenced and ignore.code not in _OF_TRIALS:
-            message = f"nothing on this line is warned of with `{ignore.code}`"
+            message = f"this line has no warning `{ignore.code}`"
             bag.warning(UNUSED, message, ignore.span, hint=_without(ignore, sources[ignore.span.file]))
     return SiftedFindings(tuple(bag), frozenset(i.span for i in ignores if i.key in silenced))
 
@@ -284,7 +284,7 @@ def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
         message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
         whole = cures.in_quotes(node.source.text[span.start : comment.end(1)])
         edit = node.source.edit(span.start, comment.end(1), whole)
-        hint = cures.write(whole, edit, "if it is a comment, write a blank behind the `#`")
+        hint = cures.write(whole, edit, "if it is a comment, write a blank after the `#`")
         yield Diagnostic("W009", message, place, Severity.WARNING, hint)
 
 

@@ -172,7 +172,7 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         (tally.undecided if finding.verdict is SearchVerdict.UNDECIDED else rooms).append(room)
     reached = [k for k, finding in enumerate(findings) if finding.verdict is SearchVerdict.SOLVABLE]
     exact = all(finding.exact or finding.verdict is SearchVerdict.UNDECIDED for finding in findings)
-    said = f"it can come about in {len(reached)} of {rooms_text(tally.rests)}"
+    said = f"it can happen in {len(reached)} of {rooms_text(tally.rests)}"
     if tally.undecided:
         said += f", {len(tally.undecided)} undecided"
     if plan.kind == "reachable":

@@ -284,7 +284,7 @@ class _Check:
             file = self._beside(written)
             if file is None:
                 beside = sorted(path.name for path in self._folder.glob("*.md"))[:20]
-                hint = "a file in the study's folder that ends in .md, or the text itself"
+                hint = "write such a file in the study's folder, or the text itself in its place"
                 message = f"there is no file `{written}` in {display_name(self._folder)}"
                 self._bag.error("S903", message, span, **advice_on(written, beside, hint))
                 return ""
@@ -378,7 +378,7 @@ class _Check:
                     self._bag.error("S107", message, self._tree.key_span(where), hint=hint)
         if not persons_of(block):
             message = "no seat of this block is a person's"
-            hint = "give one of them `person`, or leave out who has the agent's"
+            hint = "write `person` for one of them, or leave out the agent's seat"
             self._bag.error("S904", message, self._tree.key_span((*place, "seats")), hint=hint)
 
     def _player(self, who: str, seats: Sequence[str], words: Sequence[str], place: DataPath) -> None:
@@ -407,5 +407,5 @@ class _Check:
         groups = len(design.orders)
         lower = study.participants - study.participants % groups
         hint = f"`participants: {lower + groups}`" + (f", or {lower}" if lower else "")
-        message = f"{study.participants} participants do not fill {groups} groups alike"
+        message = f"{study.participants} participants cannot be divided equally among {groups} groups"
         self._bag.warning("W905", message, self._tree.value_span(("participants",)), hint=hint)

@@ -23,7 +23,7 @@ def check_actions(resolver: Resolver, found: Activity, word: Deed, node: ast.Exp
         listed = " and ".join(f"`{action}`" for action in lacking)
         message = f"`{quoted(node)}` needs {listed}, which the agent cannot do"
         edits = (cures.added(resolver.findings.places, ("actions",), action) for action in lacking)
-        hint = cures.propose(f"add {listed} to `actions`", *edits, also="or let the agent do without")
+        hint = cures.propose(f"add {listed} to `actions`", *edits, also="or let the script do without it")
         raise resolver.fail("S320", message, node, scope, hint=hint)
 
 

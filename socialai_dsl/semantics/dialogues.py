@@ -115,7 +115,7 @@ class _Test:
             for path, _ in self._findings.each((*self._path, "play", i, "do"), step.do):
                 acts += 1
                 if acts == horizon + 1:
-                    message = f"the episode ends after {horizon} steps, and this is one more"
+                    message = f"the episode ends after {horizon} steps, before this one"
                     hint = "delete what comes from here on, or give the scenario a longer `horizon`"
                     raise self._findings.fail("S804", message, self._findings.at(path), hint=hint)
 

@@ -292,7 +292,7 @@ def _differ(findings: Findings, member: Member, first: Case, other: Case) -> Non
             f"the frame `{case.path[-1]}`" if case.raw is not None else "no frame" for case in (first, other)
         )
         message = f"`{two}` follows {of_two}, `{one}` follows {of_one}"
-    message += "; what is drawn by `one_of` shares one"
+    message += "; the files of `one_of` must share one"
     hint = "let both extend a file with the frame, and put what differs into its slots"
     findings.error("S315", message, findings.places.value_span(place), hint=hint)
 
@@ -554,7 +554,7 @@ def _check_shared(resolver: Resolver, member: Member) -> None:
     """What all that a member can be must have in common: each key of which the language has no cases."""
     for key in CastMember.model_fields.keys() - _WITH_CASES:
         for other in member.cases(key)[1:]:
-            message = f"what is drawn by `one_of` has one and the same `{key}`"
+            message = f"the files of `one_of` must have the same `{key}`"
             span = resolver.findings.places.key_span(other.path)
             resolver.findings.error("S315", message, span, hint=f"give `{key}` beside `one_of`")
 

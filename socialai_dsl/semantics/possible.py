@@ -221,11 +221,13 @@ def _check_circles(states: dict[str, State], path: DataPath, findings: Findings)
     for circle in _circles(edges):
         index = next(i for i, rule in enumerate(states[circle[0]].then) if rule.goto_now == circle[1])
         span = findings.at((*path, "states", circle[0], "then", index, "goto_now"), 0, len(circle[1]))
-        message = f"would go round within one step: {_told(circle)}"
+        message = f"the states go round within one step: {_told(circle)}"
         key = TextEdit(
             findings.places.key_span((*path, "states", circle[0], "then", index, "goto_now")), "goto"
         )
-        findings.error("S312", message, span, hint=cures.write("goto", key, "then the next step comes first"))
+        findings.error(
+            "S312", message, span, hint=cures.write("goto", key, "which takes effect in the next step")
+        )
 
 
 def _circles(edges: dict[str, list[str]]) -> Iterator[list[str]]:
@@ -465,7 +467,9 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     for span, conditions in _by_place(_those(checked)):
         if possible.never(conditions) is None and possible.always(conditions):
             hint = "the name of the group alone means all of them"
-            findings.warning("W319", "those are all of them: this always holds", span, hint=hint)
+            findings.warning(
+                "W319", "`those(...)` are the whole group: the condition is always true", span, hint=hint
+            )
     for required in checked.require:
         if (why := possible.never([required])) is not None:
             message = "no room is played: what it has to be like can never hold"

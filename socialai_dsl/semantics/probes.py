@@ -20,7 +20,7 @@ _MOST: Final = 64
 """The most possible answers that need not be written out."""
 _MOST_VALUES: Final = 1_000
 """The most values of the texts of all probes."""
-_KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
+_ASK_ANOTHER: Final = "ask for a value that differs between episodes, or give further `answers`"
 
 Text = tuple[str | Drawn, ...]
 
@@ -183,11 +183,14 @@ class _Entry:
         if missing:
             message = f"the answer can be `{missing[0]}`, which is not among `answers`"
             self._findings.warning(
-                "W403", message, span, hint="it would be offered only where it is right, which gives it away"
+                "W403",
+                message,
+                span,
+                hint="add it; it would be offered only where it is right, which reveals it",
             )
 
     def _check_number(self, number: int) -> None:
         if number < 2:
             span = self._findings.at((*self._path, "answers" if self._entry.answers else "answer"))
             message = f"`{self._name}` has only one answer, so nobody is asked"
-            self._findings.warning("W404", message, span, hint=_KNOWN_BEFOREHAND)
+            self._findings.warning("W404", message, span, hint=_ASK_ANOTHER)

@@ -462,7 +462,7 @@ class Registers:
         if declaration.starts_with_nothing:
             holds = declaration.range or expected
             if holds is None:
-                message = f"nothing is ever put into `{declaration.label}`, so it is not known what it holds"
+                message = f"no rule or step sets `{declaration.label}`, so its type is unknown"
                 raise self._resolver.findings.fail("S318", message, span, hint="set it in a rule or a step")
             start = SitedTerm(Const(holds, holds.low), scope.draws.site, span)
             return [(start, self._called(path, key)) for key in declaration.for_each] or [(start, path)]

@@ -121,6 +121,6 @@ def _balanced(own: Sequence[tuple[int, ...]], places: Node, bag: DiagnosticBag) 
             span = places.value_span(("assign", "groups")) if len(met) == 1 else places.key_span(("assign",))
             who = "1 group plays them" if groups == 1 else f"{groups} groups play them"
             message = f"{len(plays)} blocks have {needed} balanced orders, and {who}"
-            hint = f"as many groups as {needed}, or a multiple of it; or `order: fixed`"
+            hint = f"let {needed} groups play them, or a multiple, or write `order: fixed`"
             bag.error("S902", message, span, hint=hint)
     return found

@@ -36,7 +36,7 @@ def check_unseen(checked: CheckedScenario, tone: str | None, findings: Findings)
     for asks, what, shown_at, hint in _left_out(checked, tone, findings):
         relied_on = _relied_on(own, asks, what, hint, findings)
         if shown_at is not None and not relied_on and not _asked_elsewhere(checked, asks):
-            message = f"nobody sees {what}: `channels` leaves it out, and nothing asks for it"
+            message = f"nobody sees {what}: `channels` leaves it out, and no condition reads it"
             findings.warning("W321", message, shown_at, hint=hint)
 
 

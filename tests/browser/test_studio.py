@@ -456,7 +456,7 @@ def test_a_violated_claim_stands_beside_its_line_and_opens_its_room(shy: Page) -
     shy.get_by_role("button", name="Check the claims").click()
     claim = shy.get_by_role("list", name="claims").get_by_role("listitem").filter(has_text="never")
     claim.get_by_text("✗ fails").wait_for(timeout=90_000)
-    assert "it can come about in 100 of 100 rooms" in claim.inner_text()
+    assert "it can happen in 100 of 100 rooms" in claim.inner_text()
     assert shy.get_by_role("tab", name="Claims 2 of 4").get_attribute("aria-selected") == "true"
     box = claim.bounding_box()
     assert box is not None

@@ -55,7 +55,7 @@ def test_what_holds_is_no_failure(gate: Path, capsys: Capture) -> None:
     assert main(["check", name, "--rooms", "3", "--seed", "4"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         f"{name}: 3 rooms of seed 4",
-        "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
+        "  holds: `reachable: out`: it can happen in 3 of 3 rooms",
         "  holds: `within: 3`: a shortest success takes at most 3 steps in 3 of 3 rooms, 3 in the longest that can be "
         "solved",
         "  holds: `knowable: true`: in 3 rooms success depends on nothing hidden",
@@ -69,7 +69,7 @@ def test_what_fails_is_named_with_its_place_and_rooms(gate: Path, capsys: Captur
     name = claiming(gate, "{reachable: out}", "{never: gave_up}")
     assert main(["check", name, "--rooms", "2"]) == 1
     _, _, said, place, *_ = capsys.readouterr().out.splitlines()
-    assert said == "  fails: `never: gave_up`: it can come about in 2 of 2 rooms; in room 0 after 1 step"
+    assert said == "  fails: `never: gave_up`: it can happen in 2 of 2 rooms; in room 0 after 1 step"
     assert (
         place
         == f"    at {name}:{1 + gate.read_text()[: gate.read_text().index('{never')].count(chr(10))}:6; rooms 0, 1"
@@ -180,8 +180,8 @@ def test_an_interrupted_check_tells_what_is_known(
     assert main(["check", name, "--rooms", str(rooms)]) == 130
     assert capsys.readouterr().out.splitlines() == [
         f"{name}: 4 rooms of seed 0",
-        "  holds: `reachable: out`: it can come about in 4 of 4 rooms",
-        "  holds: `never: guard.is(asleep)`: it can come about in 0 of 2 rooms",
+        "  holds: `reachable: out`: it can happen in 4 of 4 rooms",
+        "  holds: `never: guard.is(asleep)`: it can happen in 0 of 2 rooms",
         "  of 4 rooms there was time for 2 for `never: guard.is(asleep)`; it was interrupted",
     ]
 
@@ -215,7 +215,7 @@ def test_deep_tries_everything(gate: Path, capsys: Capture) -> None:
     name = claiming(gate, "{reachable: out, share: 1}")
     assert main(["check", name, "--rooms", "3", "--deep"]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
-        "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
+        "  holds: `reachable: out`: it can happen in 3 of 3 rooms",
         "  holds: `knowable: true`: in 3 rooms success depends on nothing hidden",
         "  4 of 6 states, steps, rules and outcomes happen in some room",
         f"  {name}:11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",

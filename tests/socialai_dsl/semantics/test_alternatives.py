@@ -66,7 +66,7 @@ def test_each_key_of_a_member_has_cases_or_is_the_same_in_all_files(mistakes, fi
     differ = set()
     for key, value in values.items():
         found = mistakes(**files(ONE, ONE.replace("one", "two") + f"{key}: {value}\n"))
-        if found == [f"S315 what is drawn by `one_of` has one and the same `{key}`"]:
+        if found == [f"S315 the files of `one_of` must have the same `{key}`"]:
             differ.add(key)
         else:
             assert found == [], key
@@ -89,16 +89,16 @@ def test_a_frame_that_nobody_gives_has_no_slots(mistakes, files):
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (TWO + "earshot: 3\n", "S315 what is drawn by `one_of` has one and the same `earshot`"),
-        (TWO + "view: 3\n", "S315 what is drawn by `one_of` has one and the same `view`"),
-        (TWO + "audible: always\n", "S315 what is drawn by `one_of` has one and the same `audible`"),
+        (TWO + "earshot: 3\n", "S315 the files of `one_of` must have the same `earshot`"),
+        (TWO + "view: 3\n", "S315 the files of `one_of` must have the same `view`"),
+        (TWO + "audible: always\n", "S315 the files of `one_of` must have the same `audible`"),
         ("npc: two\n",
-         "S315 `two` follows no frame, `one` follows the frame `teach`; what is drawn by `one_of` shares one"),
+         "S315 `two` follows no frame, `one` follows the frame `teach`; the files of `one_of` must share one"),
         ("npc: two\nframe: teach\nframes: {teach: {steps: [{say: Hi}]}}\n",
-         "S315 `two` and `one` follow different frames; what is drawn by `one_of` shares one"),
-        (TWO + "accepts: agent.spoke\n", "S315 what is drawn by `one_of` has one and the same `accepts`"),
+         "S315 `two` and `one` follow different frames; the files of `one_of` must share one"),
+        (TWO + "accepts: agent.spoke\n", "S315 the files of `one_of` must have the same `accepts`"),
         (TWO + "beliefs: {door: {of: exit.color}}\n",
-         "S315 what is drawn by `one_of` has one and the same `beliefs`"),
+         "S315 the files of `one_of` must have the same `beliefs`"),
         (TWO.replace("two", "one"), "S213 `one` is the name of another of these files"),
         (TWO.replace("steps", "stepps"), "S303 frame `teach` has no slot `stepps`; did you mean `steps`?"),
         (TWO.replace("goal: pick(doors), ", ""),
