@@ -218,7 +218,7 @@ def _keep_one_frame(name: str, member: Node, keys: dict[str, Node], bag: Diagnos
                     "leave it out", cures.deleted(member, (key,)), also="without a frame it stays"
                 )
             )
-            bag.error("S104", "`frame` names one frame, here is a list", given.value_span(), hint=cure)
+            bag.error("S104", "`frame` must be one name, got a list", given.value_span(), hint=cure)
         del keys[key]
         if words:
             given.put(words[0])

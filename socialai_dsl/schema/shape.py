@@ -610,8 +610,8 @@ class _Report:
         if isinstance(finding.value, float) and expected == "an expression":
             expected = "a whole number or an expression"
         named = f"an entry of `{key}`" if finding.path and isinstance(finding.path[-1], int) else f"`{key}`"
-        what = f"{named} is {expected}" if key else f"{expected} is expected"
-        self._bag.error("S104", f"{what}, here is {got}", span, hint=hint)
+        what = f"{named} must be {expected}" if key else f"expected {expected}"
+        self._bag.error("S104", f"{what}, got {got}", span, hint=hint)
 
     def _stands_for_anything(self, value: object) -> bool:
         return self._parameters and isinstance(value, str) and PARAMETER.fullmatch(value) is not None
@@ -689,7 +689,7 @@ class _Report:
         annotation = annotation_at(self._model, finding.path)
         words = [str(word) for word in literals(annotation)]
         if not isinstance(finding.value, str):
-            message = f"one of {', '.join(words)} is expected, here is {_kind_of(finding.value)}"
+            message = f"expected one of {', '.join(words)}, got {_kind_of(finding.value)}"
             self._bag.error("S104", message, span)
             return
         advice = advice_on(finding.value, words, "one of " + ", ".join(words))

@@ -193,7 +193,7 @@ def test_variants_are_passed_on_to_leaves() -> None:
             ["3:30: S501 there is no `rom` in errands.yaml; did you mean `room` (errands.yaml:11)?",
              "3:33: S501 there is no `rom` in errands.yaml; did you mean `room` (errands.yaml:11)?"],
         ),
-        ("sweep: {errands: {room.size: 5}}", ["2:30: S104 `room.size` is a list, here is the number 5"]),
+        ("sweep: {errands: {room.size: 5}}", ["2:30: S104 `room.size` must be a list, got the number 5"]),
         (
             "tree: {scenario: lesson}\ndraw: in_sequence",
             ["2:1: S107 the acts of an episode are listed in `members`; a `tree` has no order"],
