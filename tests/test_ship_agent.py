@@ -80,7 +80,7 @@ def test_an_agent_is_shipped_again_under_another_program(agents: Path, tmp_path:
 @pytest.mark.thorough("plays the test four times")
 def test_an_agent_of_many_forms_ships_for_the_scenario(run: Path, tmp_path: Path) -> None:
     """Help stands for a suite, and the other role for a scenario that it draws forms of."""
-    assert "help_as_helper: " in ship(run, tmp_path, COMMIT, "help_as_helper", ["help"])
+    assert "help_as_helper: " in ship(run, tmp_path, COMMIT, "help_as_helper", forms=["help"])
     agent = tmp_path / "help_as_helper"
     text = (agent / "README.md").read_text(encoding="utf-8")
     assert "Trained again by `socialai-run help --recipe guided --frames 1500" in text

@@ -74,7 +74,8 @@ def test_an_agent_is_small_and_was_made_for_its_scenario(name: str) -> None:
 @pytest.mark.parametrize("name", AGENTS)
 def test_a_card_says_how_its_agent_was_made_and_nothing_of_a_machine(name: str) -> None:
     settings = json.loads((agents_folder() / name / "config.json").read_text(encoding="utf-8"))
-    (command,) = re.findall(rf"Trained again by `socialai-run {name} ([^`]+)`", card(name))
+    trained_on = figures_of(name)[1].get("trained_on", name)
+    (command,) = re.findall(rf"Trained again by `socialai-run {re.escape(trained_on)} ([^`]+)`", card(name))
     assert f"--recipe {settings['recipe']} --frames {settings['frames']}" in command
     assert re.search(r"\| trained \| \d{4}-\d\d-\d\d, with commit `[0-9a-f]{40}` \|", card(name))
     assert f'CheckpointPolicy.load("{PREFIX}{name}", env)' in card(name)

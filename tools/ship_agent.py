@@ -21,7 +21,7 @@ still do what its card says.
 
 An agent that was trained on many forms of a scenario ships for the scenario, with its success in other forms:
 
-    python tools/ship_agent.py RUN --plays dance --form dance+as_coded
+    python tools/ship_agent.py RUN --plays dance --trained-on dance_family.yaml --form dance+as_coded
 """
 
 from __future__ import annotations
@@ -158,6 +158,7 @@ def ship(
     folder: Path,
     commit: str | None = None,
     plays: str | None = None,
+    trained_on: str | None = None,
     forms: Sequence[str] = (),
 ) -> str:
     """Make `folder/NAME` of a run, and return what is to be said of it.
@@ -167,6 +168,7 @@ def ship(
         folder: where the agents are that ship.
         commit: the commit whose code trained the agent; None: see `provenance`.
         plays: the scenario for which it ships; None: that of its training.
+        trained_on: the file of its training where that is another one, as its run has a copy under another name.
         forms: other scenarios whose test it plays as well, for its card.
 
     Raises:
@@ -175,9 +177,9 @@ def ship(
     """
     config, loaded, checkpoint = finished_agent(run)
     result = read_json(run / RESULT)
-    trained_on = result.get("trained_on")
+    trained_on = trained_on or result.get("trained_on")
     if plays is not None:
-        trained_on, loaded = config.scenario, socialai_dsl.load(plays)
+        trained_on, loaded = trained_on or config.scenario, socialai_dsl.load(plays)
         config = config.model_copy(update={"scenario": plays})
     name = shipped_name(loaded, config.scenario)
     if config.own_files or ":" in config.net:
@@ -276,6 +278,7 @@ def main() -> int:
     parser.add_argument(
         "--plays", metavar="SCENARIO", help="for which it ships (default: that of its training)"
     )
+    parser.add_argument("--trained-on", metavar="FILE", help="the suite of its training, for its card")
     parser.add_argument(
         "--form",
         action="append",
@@ -288,7 +291,16 @@ def main() -> int:
     folder = agents_folder()
     folder.mkdir(exist_ok=True)
     try:
-        print(ship(arguments.run, folder, arguments.commit, arguments.plays, arguments.forms))
+        print(
+            ship(
+                arguments.run,
+                folder,
+                arguments.commit,
+                arguments.plays,
+                arguments.trained_on,
+                arguments.forms,
+            )
+        )
     except Refused as refusal:
         print(f"refused: {refusal}", file=sys.stderr)
         return 1

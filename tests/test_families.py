@@ -1,0 +1,23 @@
+"""`experiments/families`: suites that draw many forms of a scenario, some of which are held out of training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.checking.loaded import LoadedSuite
+from socialai_dsl.frontend import check, load
+from socialai_dsl.loader.shipped import variants_of
+
+FAMILIES = sorted((Path(__file__).parents[1] / "experiments" / "families").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("file", FAMILIES, ids=lambda file: file.stem)
+def test_a_family_has_no_findings_and_is_one_of_a_scenario_with_a_script(file: Path) -> None:
+    assert check(str(file)).diagnostics == ()
+    scenario = file.stem.removesuffix("_family")
+    assert "oracle" in variants_of(scenario)
+    loaded = load(str(file))
+    assert isinstance(loaded, LoadedSuite)
+    assert len(loaded.members) > 2
