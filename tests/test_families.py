@@ -16,7 +16,6 @@ FAMILIES = sorted((Path(__file__).parents[1] / "experiments" / "families").glob(
 @pytest.mark.parametrize("file", FAMILIES, ids=lambda file: file.stem)
 def test_a_family_has_no_findings_and_is_one_of_a_scenario_with_a_script(file: Path) -> None:
     assert check(str(file)).diagnostics == check(f"{file}+oracle").diagnostics == ()
-    assert check(str(file)).diagnostics == check(f"{file}+oracle").diagnostics == ()
     scenario = file.stem.removesuffix("_family")
     assert "oracle" in variants_of(scenario)
     loaded = load(str(file))
