@@ -113,7 +113,9 @@ def added(tree: Node, path: DataPath, text: str) -> TextEdit | None:
 
 
 def deleted(tree: Node, path: DataPath) -> TextEdit | None:
-    """The edit that takes the entry of a mapping away, and what would be empty without it."""
+    """The edit that takes the entry of a mapping away, and what would be empty without it; None for the whole tree."""
+    if not path:
+        return None
     part, around = tree.get(path), tree.get(path[:-1])
     if part is None or around is None or part.span.key is None or part.source != around.source:
         return None

@@ -10,10 +10,11 @@ from socialai_dsl.schema.shape import model_of
 
 def check_curriculum(resolved: ResolvedFile, bag: DiagnosticBag) -> Curriculum | None:
     """The curriculum of a file, None if there is none; `bag` takes the findings."""
-    curriculum = model_of(Curriculum, resolved.tree, bag, parameters=False).model
+    shaped = model_of(Curriculum, resolved.tree, bag, parameters=False)
+    curriculum = shaped.model
     for number, phase in enumerate(curriculum.phases[:-1] if curriculum is not None else ()):
         if phase.until is None:
             message = f"phase {number + 1} never ends, so those after it are never played"
-            span = resolved.tree.value_span(("phases", number))
+            span = shaped.tree.value_span(("phases", number))
             bag.error("S105", message, span, hint="give it `until`, or make it the last one")
     return curriculum

@@ -137,7 +137,7 @@ def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperi
     shaped = model_of(Experiment, resolved.tree, bag, parameters=False)
     if shaped.model is None:
         return None
-    experiment = shaped.model
+    experiment, resolved = shaped.model, resolved.mended(shaped.tree)
     if experiment.profile is not None and experiment.profile not in experiment.profiles:
         hint = "the file's profiles are " + (", ".join(experiment.profiles) or "none")
         advice = advice_on(experiment.profile, experiment.profiles, hint)

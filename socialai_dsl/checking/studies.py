@@ -185,7 +185,8 @@ def check_study(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedStudy | Non
     shaped = model_of(Study, resolved.tree, bag, parameters=False)
     if shaped.model is None:
         return None
-    study, check = shaped.model, _Check(resolved, bag)
+    study, resolved = shaped.model, resolved.mended(shaped.tree)
+    check = _Check(resolved, bag)
     pictures: dict[str, Path] = {}
     consent = check.page(study.consent, ("consent",), pictures)
     instructions = [

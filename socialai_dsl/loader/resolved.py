@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -499,6 +500,15 @@ class ResolvedFile:
         self._library = library
         self._build = build
         self._given = given
+
+    def mended(self, tree: Node) -> ResolvedFile:
+        """The same file with the tree that its models were made of, in which misspelt keys are spelt right.
+
+        Where a model has a value, this tree has a place for it.
+        """
+        found = copy(self)
+        found.tree, found.data = tree, tree.data
+        return found
 
     @property
     def files(self) -> dict[str, Source]:
