@@ -125,6 +125,15 @@ Expressions = Annotated[
 ]
 """One expression, or a list of them."""
 
+_Starts = Annotated[
+    ListOf[Expression],
+    Field(min_length=1),
+    BeforeValidator(
+        _one_or_many,
+        json_schema_input_type=Expression | Annotated[tuple[Expression, ...], Field(min_length=1)],
+    ),
+]
+
 Effect = Annotated[Expressions, Holds("effect")]
 """One effect, or a list of them."""
 
@@ -359,7 +368,7 @@ class Look(Model):
     words: Annotated[ListOf[Word], Hides(True)] = Field(
         min_length=2, max_length=8, description="the words, two to eight", examples=[["small", "large"]]
     )
-    start: Expressions = Field(
+    start: _Starts = Field(
         ("random",),
         description="the initial word: an expression in which `it` is each of the group, or a list "
         "with one each; default `random`",
