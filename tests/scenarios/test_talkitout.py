@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 import socialai_dsl as sd
@@ -149,3 +150,17 @@ class TestPerception:
         assert kept[1] == [*kept[0], "gandalf", "ask", "john"]
         assert len(tokens) == 256
         assert kept[-1] == ["gandalf", "ask", "john"] * 85
+
+
+def test_as_coded_is_the_same_task_in_other_words() -> None:
+    """The same pictures, lines with words at the same places of the vocabulary, and rewards, whatever is done."""
+    plain, coded = (sd.make_vec(f"talkitout{variant}", num_envs=16) for variant in ("", "+as_coded"))
+    rng, sizes = np.random.default_rng(0), plain.single_action_space.nvec
+    for envs in (plain, coded):
+        envs.reset(seed=3)
+    for _ in range(60):
+        acts = rng.integers(0, sizes, (16, len(sizes)))
+        acts[:, 0] %= 3
+        (one, reward, *_), (other, paid, *_) = plain.step(acts), coded.step(acts)
+        assert all(np.array_equal(one[part], other[part]) for part in one)
+        assert np.array_equal(reward, paid)
