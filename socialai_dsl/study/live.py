@@ -207,9 +207,11 @@ class Live:
             page.leave(FAST, "")
             return
         message = parsed(content)
-        if isinstance(message, Beat):
-            return
         person = self.progress.people[page.person]
+        if isinstance(message, Beat):
+            if page.on != self._screens.on(person):  # others went on while it was not heard
+                await self._show([person.id])
+            return
         others: Iterable[str] = ()
         if message is not None and message.on == self._screens.on(person):
             others = self._taken(person, page, message)
@@ -279,12 +281,13 @@ class Live:
 
     def _match(self, block: int, waiting: dict[str, float]) -> list[str]:
         study, now = self._study.blocks[block], self._clock()
-        for person in [one for one in waiting if not (one in self.pages and self.is_there(one, study.away))]:
-            del waiting[person]  # nobody plays with who is not there
+        for person in [one for one in waiting if one not in self.pages]:
+            del waiting[person]  # whoever comes back waits anew
+        there = [person for person in waiting if self.is_there(person, study.away)]
         told: list[str] = []
         count = len(persons_of(study))
-        while waiting:
-            people = list(waiting)[:count]
+        while there:
+            people, there = there[:count], there[count:]
             if len(people) < count and now - waiting[people[0]] < study.wait:
                 break
             for person in people:

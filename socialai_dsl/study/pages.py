@@ -29,6 +29,7 @@ class Page:
     Attributes:
         person: whose. send: takes what is to be shown. leave: closes the connection with a code and words.
         connection: which of the participant's it is, from 1. sign: when it was last heard.
+        on: the name of the screen that it shows, or will.
         knows: the game of which it has been told what can be done and said.
         elsewhere: whether it is a page of somebody else, which keeps data of its own.
     """
@@ -38,6 +39,7 @@ class Page:
     leave: Callable[[int, str], None]
     connection: int
     sign: float
+    on: str | None = None
     knows: str | None = None
     elsewhere: bool = False
     _tokens: float = _BURST
@@ -52,6 +54,7 @@ class Page:
 
     def will_show(self, screen: Screen) -> _Due:
         """A screen that is shown behind those before it, once `show` is told that it may be."""
+        self.on = screen["on"]
         self._due.append(_Due(screen))
         return self._due[-1]
 
@@ -64,4 +67,5 @@ class Page:
     def show_at_once(self, screen: Screen) -> None:
         """Show a screen in place of those that have not been shown, of which nothing is true any more."""
         self._due.clear()
+        self.on = screen["on"]
         self.send(screen)

@@ -32,7 +32,9 @@ from tests.socialai_dsl.study.participants import (
     Clock,
     Taking,
     loaded_study,
+    meet,
     newcomer,
+    pass_time,
     run,
     until,
 )
@@ -437,6 +439,50 @@ def test_the_script_takes_the_seat_for_which_nobody_comes(place: Path, tmp_path:
     run(wait)
     (game,) = [event for event in read_log(tmp_path / FILE) if event["event"] == "game"]
     assert game["seats"] == {"agent": "p0001", "jill": "script"}
+
+
+def test_who_was_not_heard_while_waiting_is_matched_once_heard_again(place: Path, tmp_path: Path) -> None:
+    """As a page in the background, whose signs a browser sends late: it is not matched then, and not forgotten."""
+
+    async def wait() -> None:
+        clock = Clock()
+        live = Live(loaded_study(TOGETHER, place), tmp_path, clock)
+        one = await newcomer(live)
+        await until(one, "room")
+        await pass_time(live, clock, 8)
+        other = await newcomer(live)
+        await until(other, "room")
+        await pass_time(live, clock, 3, other)
+        assert (one.now["do"], other.now["do"]) == ("room", "room"), "nobody plays with who is not there"
+        await pass_time(live, clock, 1, one, other)
+        assert (one.now["do"], other.now["do"]) == ("play", "play")
+        await live.close()
+
+    run(wait)
+
+
+def test_who_was_not_heard_is_shown_what_others_did_meanwhile(place: Path, tmp_path: Path) -> None:
+    """Also if they have come to the end of the last episode, after which nobody goes on by themselves."""
+    loaded = loaded_study(TOGETHER.replace("episodes: 2", "episodes: 1"), place)
+
+    async def play() -> None:
+        clock = Clock()
+        live = Live(loaded, tmp_path, clock)
+        people = await meet(live)
+        away, stays = people["jill"], people["agent"]
+        await away.act("left")
+        assert away.now["waiting"]
+        await pass_time(live, clock, 8, stays)
+        while not stays.now.get("ended"):
+            await stays.act("left")
+        assert not away.now.get("ended")
+        await pass_time(live, clock, 1, stays, away)
+        assert away.now["ended"]
+        await away.go()
+        assert away.now["do"] == "end"
+        await live.close()
+
+    run(play)
 
 
 def test_another_takes_the_place_of_who_dropped_out(place: Path, tmp_path: Path) -> None:
