@@ -415,12 +415,12 @@ def _snippet(span: Span, source: Source, paint: str, reset: str) -> Sequence[str
         return []
     start = max(0, span.column - 1 - _SHOWN_BEFORE)
     end = min(len(line), start + _SHOWN)
-    before = ("…" if start else "") + _flat(line[start : span.column - 1])
+    cut, before = "…" if start else "", _flat(line[start : span.column - 1])
     marked = _flat(line[span.column - 1 : min(end, span.column - 1 + span.width)])
-    shown = ("…" if start else "") + _flat(line[start:end]) + ("…" if end < len(line) else "")
+    shown = cut + _flat(line[start:end]) + ("…" if end < len(line) else "")
     caret = "^" + "~" * (_cells(marked) - 1)
     gutter = f"{span.line:>4} | "
-    return [gutter + shown, " " * (len(gutter) + _cells(before)) + paint + caret + reset]
+    return [gutter + shown, " " * (len(gutter) + len(cut) + _cells(before)) + paint + caret + reset]
 
 
 def _flat(line: str) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from socialai_dsl.checking.studies import LoadedStudy
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
 from socialai_dsl.study.arena import Arena, Episode
@@ -47,6 +48,16 @@ blocks:
 
 def steps(folder: Path) -> list[dict[str, Any]]:
     return [event for event in read_log(folder / FILE) if event["event"] == "step"]
+
+
+async def play_an_episode(loaded: LoadedStudy, folder: Path) -> None:
+    """One person turns left until the episode ends."""
+    live = Live(loaded, folder)
+    one = await newcomer(live)
+    await one.go()
+    while not one.now.get("ended"):
+        await one.act("left")
+    await live.close()
 
 
 async def until_true(found: Any) -> None:
@@ -181,17 +192,7 @@ def test_an_agent_that_takes_over_remembers_what_came_before(scenario: str, who:
 def test_a_rival_has_the_agents_seat_from_the_start(place: Path, tmp_path: Path) -> None:
     text = LEVERS.replace("agent: person", "agent: 'rival:hurries'").replace("  stands_in: WHO\n", "")
     loaded = loaded_study(text, place)
-
-    async def play() -> str:
-        live = Live(loaded, tmp_path)
-        one = await newcomer(live)
-        await one.go()
-        while not one.now.get("ended"):
-            await one.act("left")
-        await live.close()
-        return one.now["on"]
-
-    run(play)
+    run(partial(play_an_episode, loaded, tmp_path))
     assert {event["by"]["agent"] for event in steps(tmp_path)} == {"rival:hurries"}
     moves = Counter(event["acts"]["agent"][0] for event in steps(tmp_path))
     assert len(moves) > 1, "it does something"
@@ -205,16 +206,7 @@ def test_the_column_of_the_others_names_an_agent_in_a_folder_with_a_blank(tmp_pa
     loaded = loaded_study(
         BESIDE.replace("llm:stub", "two agents/jill").replace("episodes: 2", "episodes: 1"), tmp_path
     )
-
-    async def play() -> None:
-        live = Live(loaded, tmp_path)
-        one = await newcomer(live)
-        await one.go()
-        while not one.now.get("ended"):
-            await one.act("left")
-        await live.close()
-
-    run(play)
+    run(partial(play_an_episode, loaded, tmp_path))
     tables = study_data(loaded, tmp_path).tables
     assert shlex.split(tables["episodes"][0]["others"]) == ["jill=two agents/jill"]
 
