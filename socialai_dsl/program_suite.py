@@ -137,27 +137,27 @@ def has_script(playable: Playable, seat: str) -> bool:
 
 
 def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:
-    """The channels of pictures in which several programs are shown: those that one of them has.
-
-    Raises:
-        ValueError: a look has other words in one program than in another.
-    """
+    """The channels of pictures in which several programs are shown: those that one of them has, looks last."""
     programs = tuple(programs)
-    words_of_looks(programs)
-    shown = dict.fromkeys(name for program in programs for name in program.channels)
-    return (*(name for name in CHANNELS if name in shown), *(name for name in shown if name not in CHANNELS))
+    shown = {name for program in programs for name in program.channels}
+    return (*(name for name in CHANNELS if name in shown), *words_of_looks(programs))
 
 
 def words_of_looks(programs: Iterable[Program]) -> dict[str, tuple[str, ...]]:
-    """The words of each look that one of several programs shows; raises ValueError as `channels_of` does."""
-    found: dict[str, tuple[str, ...]] = {}
-    for program in programs:
-        for name, words in program.looks:
-            if found.setdefault(name, words) != words:
-                raise ValueError(
-                    f"{program.name}: got the look {name!r} with the words {', '.join(words)}; what is played "
-                    f"together has one and the same, and another has {', '.join(found[name])}"
-                )
+    """The words of each channel of looks in pictures in which several programs are shown, by name."""
+    return {name: words for (_, words), name in look_channels(programs).items()}
+
+
+def look_channels(programs: Iterable[Program]) -> dict[tuple[str, tuple[str, ...]], str]:
+    """The channel of each look, by its name and words, in pictures in which several programs are shown.
+
+    Looks of one name share a channel if they have the same words. A further one with other words has a channel of its
+    own, whose name lists them: `size`, then `size: small medium large`.
+    """
+    found: dict[tuple[str, tuple[str, ...]], str] = {}
+    for look in dict.fromkeys(look for program in programs for look in program.looks):
+        name, words = look
+        found[look] = f"{name}: {' '.join(words)}" if name in found.values() else name
     return found
 
 

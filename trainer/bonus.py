@@ -196,12 +196,16 @@ class LineBonus:
 
 
 def cell_codes(image: NDArray[np.uint8]) -> Int64:
-    """One integer per cell, int64 (E, H * W), equal where all channels are."""
+    """One integer per cell, int64 (E, H * W), equal where all channels are and, up to about 2**-56, only there."""
     cells = image.reshape(len(image), -1, image.shape[-1]).astype(np.int64)
-    codes = cells[..., 0]
-    for channel in range(1, image.shape[-1]):
-        codes = codes << 8 | cells[..., channel]
+    codes: Int64 = cells @ _factors(image.shape[-1])  # modulo 2**64
     return codes
+
+
+@lru_cache
+def _factors(channels: int) -> Int64:
+    """Odd numbers for `cell_codes`, the same in every run."""
+    return np.random.default_rng(0).integers(-(1 << 62), 1 << 62, channels) * 2 + 1
 
 
 def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:

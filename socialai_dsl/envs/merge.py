@@ -21,7 +21,7 @@ from socialai_dsl.program import (
     TypeColumn,
     room_words,
 )
-from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, mixture, prefixed
+from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, look_channels, mixture, prefixed
 from socialai_dsl.vocabulary import ACTIONS, Sentences
 from socialai_dsl.widths import MOST_WORDS, TOKEN
 
@@ -110,16 +110,17 @@ def _parts(suite: ProgramSuite, playable: Playable, channels: Sequence[str]) -> 
     """Each program with its links into the batch."""
     token = {word: i for i, word in enumerate(playable.vocabulary)}
     ending = {name: i for i, name in enumerate(playable.outcomes)}
+    own = look_channels(suite.programs)
     return tuple(
         LinkedProgram(
             program,
             outcomes=[ending[name] for name in _endings(member, program, playable)],
             actions=[*(_body(program, word) for word in suite.actions), int(Body.NONE)],
             templates=list(templates),
-            slots=[list(own) for own in slots],
+            slots=[list(one) for one in slots],
             strides=_strides(program.sentences, suite.sentences, templates),
             tokens=[token[word] for word in program.vocabulary],
-            looks=[channels.index(name) - len(LOOKS) for name, _ in program.looks],
+            looks=[channels.index(own[look]) - len(LOOKS) for look in program.looks],
         )
         for member, program, templates, slots in zip(
             suite.members, suite.programs, suite.template_maps, suite.slot_maps, strict=True

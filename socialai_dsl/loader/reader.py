@@ -30,7 +30,8 @@ MAX_SCALAR: Final = 10_000
 MAX_INT_DIGITS: Final = 10
 MAX_FLOAT_LENGTH: Final = 30
 
-MAX_FILES: Final = 64
+MAX_FILES: Final = 512
+MAX_MATCHES: Final = 64
 MAX_TOTAL_BYTES: Final = 4 << 20
 MAX_CHAIN: Final = 8
 MAX_NAME: Final = 4_000
@@ -693,8 +694,8 @@ class Library:
         names = [name for name in yaml_files(place) if _fits(name, pattern)]
         if not names:
             raise self.error("S504", f"no file matches `{text}`", asked)
-        if len(names) > MAX_FILES:
-            raise self.error("S507", f"`{text}` matches more than {MAX_FILES} files", asked)
+        if len(names) > MAX_MATCHES:
+            raise self.error("S507", f"`{text}` matches more than {MAX_MATCHES} files", asked)
         return [self.resolved(place / name, asked) for name in names]
 
     def read(self, path: Path, asked: Span | None = None) -> Node:
@@ -713,7 +714,7 @@ class Library:
         if asked is not None:
             self.resolved(path, asked)
         if len(self._documents) == MAX_FILES:
-            raise self.error("S507", f"a scenario is made of at most {MAX_FILES} files", start)
+            raise self.error("S507", f"a scenario or suite is made of at most {MAX_FILES} files", start)
         source = replace(self._texts.get(path) or read_source(path, display_name(path)), path=path)
         self._bytes += len(source.text)
         if self._bytes > MAX_TOTAL_BYTES:

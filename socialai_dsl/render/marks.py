@@ -30,14 +30,14 @@ class Mark(NamedTuple):
 Marks = tuple[Mark, ...]
 """All looks of one thing or NPC."""
 LookWords = Mapping[str, Sequence[str]]
-"""Name of each look that pictures show -> its words."""
+"""Name of each look that pictures show -> its words; more may follow the name, after a colon (`look_channels`)."""
 
 
 def marks_of(looks: LookWords, shown: Iterable[int]) -> Marks:
     """The marks for the channels of looks in a cell, in the order of the looks."""
     found = zip(looks.items(), shown, strict=True)
     return tuple(
-        Mark(name, words[place], place, row)
+        Mark(name.partition(":")[0], words[place], place, row)
         for row, ((name, words), place) in enumerate(found)
         if place != NO_GESTURE
     )

@@ -62,7 +62,6 @@ def shared_space(
         places: where the parts of the suite's file stand.
         bag: takes the findings.
     """
-    _check_looks(names, members, places, bag)
     own = [member.sentences for member in members]
     written = None if isinstance(suite.grammar, str) else suite.grammar
     if written is not None:
@@ -94,20 +93,6 @@ def _only_heard(sentences: Sentences) -> Iterator[str]:
     for place, slot in enumerate(sentences.slots):
         if not any(used[place] for used in sentences.used):
             yield slot.name
-
-
-def _check_looks(
-    names: Sequence[str], members: Sequence[CheckedScenario], places: Node, bag: DiagnosticBag
-) -> None:
-    """Report looks whose words differ from member to member: all members are seen in the same channels."""
-    known: dict[str, tuple[str, tuple[str, ...]]] = {}
-    for name, member in zip(names, members, strict=True):
-        for look in member.looks if not bag.has_errors else ():
-            other, words = known.setdefault(look.name, (name, look.words))
-            if words != look.words:
-                message = f"the look `{look.name}` has other words in `{name}` than in `{other}`"
-                hint = "members of a suite share its channels, so give the look the same words, or two names"
-                bag.error("S106", message, places.key_span(("suite",)), hint=hint)
 
 
 def _slots(written: UtteranceGrammar | None, own: Sequence[Sentences]) -> dict[str, tuple[str, ...]]:

@@ -231,7 +231,9 @@ def test_a_bonus_of_another_size_is_refused() -> None:
         bonus.load_state({"counts": np.zeros((3, 1), np.int32), "keys": np.zeros(1, np.int64)})
 
 
-def test_cell_codes_tell_channels_apart() -> None:
-    image = np.zeros((1, 1, 4, 4), np.uint8)
-    image[0, 0] = [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
-    assert len(set(cell_codes(image)[0].tolist())) == 4
+@pytest.mark.parametrize("channels", [4, 9, 15, 40])
+def test_cell_codes_tell_channels_apart(channels: int) -> None:
+    image = np.concatenate([np.eye(channels, dtype=np.uint8) * value for value in (1, 2, 128, 255)])
+    codes = cell_codes(np.concatenate((image, image))[None, None])[0]
+    assert len(set(codes.tolist())) == len(image)
+    assert np.array_equal(codes[: len(image)], codes[len(image) :])

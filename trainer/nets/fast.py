@@ -23,11 +23,10 @@ class Cells:
 
     def __init__(self, images: Tensor, sizes: tuple[int, ...]) -> None:
         cells = images.flatten(1, 2)
-        code = cells[..., 0].to(torch.int64)
-        for channel, size in enumerate(sizes[1:], start=1):
-            code = code * size + cells[..., channel]
-        codes, self.kind_of = torch.unique(code, return_inverse=True)
-        self.kinds = torch.stack(torch.unravel_index(codes, sizes), 1)
+        codes, self.kind_of = torch.unique(_codes(cells, sizes), return_inverse=True)
+        of_kind = torch.empty_like(codes)  # a cell of each kind: any of them, since they are equal
+        of_kind[self.kind_of.flatten()] = torch.arange(self.kind_of.numel(), device=images.device)
+        self.kinds = cells.flatten(0, 1)[of_kind].to(torch.int64)
         self._channel = torch.arange(len(sizes), device=images.device)
 
     @cached_property
@@ -45,6 +44,17 @@ class Cells:
         """
         entries = table[self._channel, self.kinds] if dim == 0 else table[:, self._channel, self.kinds]
         return entries.sum(dim + 1)
+
+
+def _codes(cells: Tensor, sizes: tuple[int, ...]) -> Tensor:
+    """One int64 for each cell, equal where all channels are, in the order of the channels; (I, cells)."""
+    codes, count = cells[..., 0].to(torch.int64), sizes[0]
+    for channel, size in enumerate(sizes[1:], start=1):
+        if count * size > torch.iinfo(torch.int64).max:  # so many cannot occur: number those that do
+            found, codes = torch.unique(codes, return_inverse=True)
+            count = len(found)
+        codes, count = codes * size + cells[..., channel], count * size
+    return codes
 
 
 class FastNet(ActorCritic):

@@ -82,6 +82,11 @@ class MapSight(Sight):
         *self._parts, self.size = np.cumsum(sizes).tolist()
         self._sizes = tuple(highest + 1 for highest in high)
         # A cell's code is one number: its channels are the digits.
+        if prod(self._sizes) > np.iinfo(np.int64).max:
+            raise ValueError(
+                f"net: relations keeps a map, whose cells have at most 63 bits; got {channels} channels of "
+                f"{', '.join(map(str, self._sizes))} values; use another network, or fewer looks and gestures"
+            )
         self._digits = np.array([prod(self._sizes[channel + 1 :]) for channel in range(channels)])
         right, ahead = np.divmod(np.arange(height * width), width)
         at = np.stack((right - height // 2, width - 1 - ahead), 1)  # (cells, 2), as the agent sees them

@@ -13,7 +13,7 @@ import pytest
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader import reader, resolved
 from socialai_dsl.loader.members import check_splits, members_of
-from socialai_dsl.loader.reader import MAX_CHAIN, MAX_FILES
+from socialai_dsl.loader.reader import MAX_CHAIN, MAX_FILES, MAX_MATCHES
 from socialai_dsl.loader.resolved import resolve, shipped_names
 from tests.fuzzing.playground import listening
 
@@ -365,10 +365,17 @@ def test_chain_length_is_exact(write: Write) -> None:
 
 def test_number_and_size_of_files(write: Write) -> None:
     for i in range(MAX_FILES):
-        write(f"user/many/n{i}.yaml", f"npc: n{i}\n")
-    write("user/many.yaml", "scenario: many\ncast: {a: {one_of: many/n*.yaml}}\n")
-    with pytest.raises(ScenarioError, match="S507 a scenario is made of at most 64 files"):
-        resolve("many").include_all(("cast", "a", "one_of"))
+        write(f"user/many/{i // MAX_MATCHES}/n{i}.yaml", f"npc: n{i}\n")
+    several = "".join(f"  a{i}: {{one_of: many/{i}/n*.yaml}}\n" for i in range(MAX_FILES // MAX_MATCHES))
+    write("user/many.yaml", f"scenario: many\ncast:\n{several}")
+    many, last = resolve("many"), MAX_FILES // MAX_MATCHES - 1
+    for i in range(last):
+        many.include_all(("cast", f"a{i}", "one_of"))
+    with pytest.raises(ScenarioError, match="S507 a scenario or suite is made of at most 512 files"):
+        many.include_all(("cast", f"a{last}", "one_of"))
+    write("user/many/0/n.yaml", "npc: n\n")
+    with pytest.raises(ScenarioError, match=r"S507 `many/0/n\*.yaml` matches more than 64 files"):
+        resolve("many").include_all(("cast", "a0", "one_of"))
     for i in range(6):
         write(f"user/large/n{i}.yaml", f"npc: n{i}\n" + "#" * 900_000)
     write("user/large.yaml", "scenario: large\ncast: {a: {one_of: large/n*.yaml}}\n")

@@ -147,8 +147,12 @@ def test_kinds_of_cells_are_told_apart_by_every_channel() -> None:
     assert len(set(view.kind_of[:, 2 * 7 + 3].tolist())) == 5
 
 
-def test_every_cell_is_of_the_kind_that_it_shows() -> None:
-    images, sizes = random_images(4), tuple(high + 1 for high in SPEC.image_high)
+@pytest.mark.parametrize("more", [0, 4, 11, 40])
+def test_every_cell_is_of_the_kind_that_it_shows(more: int) -> None:
+    """Also if the numbers of all channels together would not fit into 64 bits."""
+    sizes = (*(high + 1 for high in SPEC.image_high), *(256,) * more)
+    further = torch.randint(254, 256, (4, 7, 7, more), generator=torch.Generator().manual_seed(more))
+    images = torch.cat((random_images(4), further.to(torch.uint8)), 3)
     view = Cells(images, sizes)
     assert torch.equal(view.kinds[view.kind_of], images.flatten(1, 2).to(torch.int64))
     assert len(view.kinds.unique(dim=0)) == len(view.kinds)
