@@ -52,6 +52,36 @@ def test_a_participant_comes_to_the_end_by_the_keyboard_alone(page: Page, link: 
     page.get_by_text("DONE-1").wait_for()
 
 
+READ = """async ([words, heard]) => {
+  const { Screen } = await import("/static/screen.js");
+  const screen = new Screen(words, () => {}, {}), read = [];
+  for (const [t, lines] of heard.entries()) {
+    const listed = new Set(screen.heard.children);
+    screen.hear({ t, heard: lines });
+    read.push([...screen.heard.children].filter((item) => !listed.has(item)).map((item) => item.textContent));
+  }
+  return [read, [...screen.heard.children].map((item) => item.textContent)];
+}"""
+
+
+def test_a_screen_reader_is_given_new_lines_alone(page: Page, link: Callable[[str], str]) -> None:
+    """It reads what is added to the list of what was heard, and the list keeps its last lines only."""
+    words = words_of("en")
+    page.goto(link("en"))
+    page.get_by_role("button", name=words["agree"]).wait_for()
+    assert page.get_by_role("main").get_attribute("aria-live") == "polite"  # a new page is read
+    hello, again, bye = [1, "Ann: Hello"], [3, "Ann: Hello"], [3, "Bob: Bye"]
+    heard = [[], [hello], [hello], [hello, again, bye], [again, bye], [again, bye, [5, "Ann: Hello"]], []]
+    read, listed = page.evaluate(READ, [words, heard])
+    nothing = words["nothing_heard"]
+    assert read == [[nothing], ["Ann: Hello"], [], ["Ann: Hello", "Bob: Bye"], [], ["Ann: Hello"], [nothing]]
+    assert listed == [nothing]
+    for button in ("agree", "next"):
+        page.get_by_role("button", name=words[button]).click()
+    page.get_by_text("Round 1 of 1").wait_for()
+    assert page.get_by_role("main").get_attribute("aria-live") == "off"
+
+
 @pytest.mark.parametrize("language", ["de", "fr"])
 def test_the_page_speaks_the_language_of_the_study_and_fits_a_phone(
     browser: Browser, link: Callable[[str], str], language: str
