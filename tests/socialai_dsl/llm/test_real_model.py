@@ -78,3 +78,27 @@ def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpo
 def test_a_schema_holds_it_to_objects(endpoint: Endpoint, tmp_path: Path) -> None:
     prompting = PromptOptions(mode="json", history=1)
     assert played("help", prompting, tmp_path / "episode.jsonl", endpoint, 2).invalid == 0
+
+
+def test_it_takes_part_in_a_study_and_sits_beside_somebody(endpoint: Endpoint, tmp_path: Path) -> None:
+    pytest.importorskip("uvicorn", reason="studies need the extra studio")
+    from socialai_dsl.frontend import load_study
+    from socialai_dsl.study.rehearsal import rehearse
+
+    (tmp_path / "short.yaml").write_text(
+        "scenario: short\nextends: together/help_together\nhorizon: 6\n", encoding="utf-8"
+    )
+    seats = '{jill: "llm:smollm2"}'
+    (tmp_path / "study.yaml").write_text(
+        "study: beside_a_model\nconsent: I agree.\n"
+        f"blocks: [{{scenario: short.yaml, episodes: 1, seats: {seats}, act_within: 120}}]\n"
+        f'model: {{base_url: "{endpoint.base_url}", grammar: true, history: 1, max_tokens: 40}}\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "out").mkdir()
+    loaded = load_study(str(tmp_path / "study.yaml"))
+    found = rehearse(loaded, tmp_path / "out", 2, pace=0.1, kinds=("script", "llm:smollm2"))
+    assert all(course.finished and not course.by_chance for course in found.courses)
+    beside = [row for row in found.data.tables["steps"] if row["seat"] == "jill"]
+    assert beside
+    assert all(row["by"] == "llm:smollm2" and row["reply"].startswith("Act: ") for row in beside)
