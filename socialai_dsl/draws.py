@@ -30,6 +30,8 @@ on batch size, threads, or on what anybody else drew.
   `attempt_key(key, attempt)` in place of the episode's key until the reset is over. Attempt 0 has the key itself.
 * Act k of an episode in acts (`draw: in_sequence`) has `act_key(key, k)` in place of the episode's key. Act 0 has the
   key itself, and no member is drawn.
+* What stays the same in a session of n episodes (`session`) has `episode_key(seed, index, first)`, `first` being the
+  number of the session's first episode, `episode - episode % n`; in act k the `act_key` of that. No attempt changes it.
 * A suite's member is drawn at site `member`, number 0: `choose(u, weights)`, by default with weight 1 for each, which
   is `below(u, n)`.
 * A choice among n things takes the `below(u, n)`-th of them: members of a group by index, alternatives as written,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from itertools import chain
+from math import lcm
 from typing import Any, Self
 
 from socialai_dsl.program import CHANNELS, FrameColumn, Header, Outcome, Program
@@ -60,6 +61,11 @@ class ProgramSuite:
     def nouns(self) -> tuple[str, ...]:
         """What `<noun>` can be; of a grammar with `slots` the words of each, one slot after the other."""
         return tuple(word for slot in self.sentences.slots for word in slot.words)
+
+    @property
+    def session(self) -> int:
+        """How many episodes in a row share draws: so many that the sessions of all programs fit into one."""
+        return lcm(*(program.session for program in self.programs))
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:

@@ -34,3 +34,18 @@ def test_an_agent_learns(
     figures = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["eval"]
     assert figures["episodes"] == 500
     assert figures["success_rate"] >= least
+
+
+@pytest.mark.learning
+@pytest.mark.timeout(3600)
+def test_an_agent_learns_within_a_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It guesses in the first episode, and goes by what it saw from then on."""
+    boxes = str(Path(__file__).parents[1] / "experiments" / "sessions" / "same_box.yaml")
+    options = ["--recipe", "plain", "--frames", "1000000", "--seed", "1", "--threads", "1", "--device", "cpu"]
+    assert main.main(["run", boxes, *options, "--out", str(tmp_path), "--json"]) == 0
+    capsys.readouterr()
+    figures = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["eval"]
+    first, *later = [trial["success_rate"] for trial in figures["trials"]]
+    assert first < 0.7
+    assert len(later) == 4
+    assert min(later) >= 0.95

@@ -27,7 +27,7 @@ class Chunks:
 
     Attributes:
         batch: all frames of the rollout, (T, E, ...).
-        resets: bool (T, E), where an episode starts, into which no memory reaches.
+        resets: bool (T, E), where a session starts, into which no memory reaches.
         pairs: int64 (T, E, 2), row of the image in `images` and state of the history in the tree.
         images: uint8 (I, H, W, C).
         tree: of the histories.
@@ -82,7 +82,7 @@ def chunks(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Ch
     memories[:: config.bptt] = rollout.memories
     every = Chunks(
         batch,
-        rollout.starts,
+        rollout.forgets,
         torch.stack((actor.move(images), actor.move(histories)), 2),
         actor.move(actor.images.data),
         tree,

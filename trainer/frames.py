@@ -59,7 +59,7 @@ class Stretches:
     """T steps each of B environments, with their distinct frames prepared once; N = T * B frames, time-major.
 
     Attributes:
-        starts: bool (T, B), whether an episode starts with the step. memory: (B, ...) before the first step.
+        starts: bool (T, B), whether memory starts anew with the step. memory: (B, ...) before the first step.
         images: uint8 (I, H, W, C), distinct ones. histories: int16 (D, L), distinct ones, as the network reads them.
         prepared: the net's view of the images. tree: of the histories.
         image_index, history_index: int64 (P,), image and history of each distinct pair.

@@ -43,7 +43,7 @@ def stretches_of(session: Session, rollout: Rollout, envs: Tensor) -> Stretches:
     pair_rows, frame_index = np.unique(cut(session, rollout.pair_rows, envs).numpy(), return_inverse=True)
     return Stretches.of(
         actor.net,
-        cut(session, rollout.starts, envs),
+        cut(session, rollout.forgets, envs),
         rollout.memories.index_select(1, envs.to(actor.device)).flatten(0, 1),
         actor.images.data,
         actor.histories.data,

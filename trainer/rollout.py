@@ -18,7 +18,7 @@ from socialai_dsl.trainer.features import Actor, Int64, content_ids
 from socialai_dsl.trainer.guides import Guide, Lead
 from socialai_dsl.trainer.logging import Tally
 from socialai_dsl.trainer.nets.memory import emptied
-from socialai_dsl.trainer.session import Session
+from socialai_dsl.trainer.session import Session, session_of
 
 
 class Rollout(NamedTuple):
@@ -27,7 +27,7 @@ class Rollout(NamedTuple):
     Attributes:
         actions: int64 (T, E, H), as played.
         values, rewards: float32 (T, E); rewards with the bonus.
-        starts, ended: bool (T, E), whether the episode began, and whether it ended, with this step.
+        forgets, ended: bool (T, E), whether memory is emptied before this step, and whether the episode ended with it.
         bootstrap: float32 (T, E), value of the state a time-out cut an episode off in; 0 elsewhere.
         pair_rows: int64 (T, E), row of the actor's `pairs`; on the CPU.
         log_probs: float32 (T, E, H) of the policy, before masking.
@@ -40,7 +40,7 @@ class Rollout(NamedTuple):
     actions: Tensor
     values: Tensor
     rewards: Tensor
-    starts: Tensor
+    forgets: Tensor
     ended: Tensor
     bootstrap: Tensor
     pair_rows: Tensor
@@ -72,8 +72,8 @@ def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) 
     actor.begin()
     for t in range(config.horizon):
         rows, features = actor.see(state.image, state.tokens, _ids(session))  # (E,), (E, F)
-        starts = actor.move(state.starts)  # (E,)
-        memory = emptied(state.memory, starts)  # (E, *shape)
+        forgets = actor.move(state.forgets)  # (E,)
+        memory = emptied(state.memory, forgets)  # (E, *shape)
         if t % (config.bptt or config.horizon) == 0:
             memories.append(memory)
         output, state.memory = net.memory.step(features, memory)
@@ -86,8 +86,10 @@ def collect(session: Session, choose: Callable[[Tensor], Tensor] | None = None) 
             actions, given = _follow(session, session.guide, actions, tally)
             leads.append(given)
         reward, ended, bootstrap = map(actor.move, _step(session, actions, tally))  # (E,) each
-        steps.append((actions, values, reward, starts, ended, bootstrap, torch.from_numpy(rows), logits))
-    next_value = _value(actor, emptied(state.memory, ended), state.image, state.tokens, _ids(session))
+        steps.append((actions, values, reward, forgets, ended, bootstrap, torch.from_numpy(rows), logits))
+    next_value = _value(
+        actor, emptied(state.memory, actor.move(state.forgets)), state.image, state.tokens, _ids(session)
+    )
     *columns, logits = (torch.stack(column) for column in zip(*steps, strict=True))
     log_probs, _ = heads.log_probs_and_entropies(logits, columns[0], sizes)
     lead = None
@@ -168,6 +170,7 @@ def _step(
         bootstrap[cut] = values.cpu().numpy()
     state.seen[ended] = 0
     state.tokens, state.starts = observation["tokens"].copy(), ended
+    state.trials = (state.trials + ended) % session_of(envs)
     state.image, state.seen = session.actor.net.sight.look(
         observation["image"].copy(), state.tokens, state.seen
     )

@@ -52,6 +52,11 @@ def _seats_of(envs: Any) -> int:
     return int(envs.num_envs) // int(getattr(envs, "num_games", envs.num_envs))
 
 
+def session_of(envs: Any) -> int:
+    """How many episodes in a row an agent remembers: those that share draws."""
+    return int(getattr(envs.program, "session", 1))
+
+
 def _partners_in(envs: Any) -> Mapping[str, Any]:
     """The policies that fill other seats of a vector environment than those that learn."""
     found: Mapping[str, Any] = getattr(envs, "partners", {})
@@ -65,6 +70,7 @@ class State:
     Attributes:
         image: uint8 (E, *sight.shape), tokens: int16 (E, L): the current observation, the image as the net sees it.
         starts: bool (E,), whether the current observation begins an episode.
+        trials: int64 (E,), how many episodes of the running session have ended.
         memory: float32 (E, *shape), before the current observation.
         seen: int64 (E, sight.size), what the network's sight keeps of the running episodes.
         returns: float64 (E,), lengths: int64 (E,) of the running episodes.
@@ -74,11 +80,18 @@ class State:
     image: NDArray[np.uint8]
     tokens: NDArray[np.int16]
     starts: NDArray[np.bool_]
+    trials: Int64
     memory: Tensor
     seen: Int64
     returns: NDArray[np.float64]
     lengths: Int64
     led: NDArray[np.bool_]
+
+    @property
+    def forgets(self) -> NDArray[np.bool_]:
+        """Which memories are emptied before the current observation: where a session begins; bool (E,)."""
+        forgets: NDArray[np.bool_] = self.starts & (self.trials == 0)
+        return forgets
 
 
 @dataclass
@@ -159,6 +172,7 @@ class Session:
             image=image,
             tokens=observation["tokens"].copy(),
             starts=np.ones(config.envs, np.bool_),
+            trials=np.zeros(config.envs, np.int64),
             memory=net.memory.initial(config.envs),
             seen=seen,
             returns=np.zeros(config.envs),
@@ -302,6 +316,8 @@ class Session:
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         if not self.state.seen.size:
             stored.setdefault("seen", torch.from_numpy(self.state.seen))  # runs of before have nothing there
+        if session_of(self.envs) == 1:
+            stored.setdefault("trials", torch.from_numpy(self.state.trials))  # nor there
         for name, present in vars(self.state).items():
             value = fitting(stored, name, torch.as_tensor(present))
             is_tensor = isinstance(present, Tensor)

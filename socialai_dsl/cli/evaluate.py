@@ -119,9 +119,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--trials",
         type=positive,
-        default=1,
         metavar="K",
-        help="number of episodes in a row that the agent remembers, with results by trial (default: 1)",
+        help="number of episodes in a row that the agent remembers, with results by trial (default: those of a session "
+        "of the scenario, or 1)",
     )
     add_seats(parser, models=True)
     add_participant(parser, "for the agent human: ")

@@ -40,8 +40,15 @@ class Label:
 
 @dataclass
 class Sites:
-    """The table of draw sites: (path, number) -> row."""
+    """The table of draw sites.
 
+    Attributes:
+        rows: (path, number) -> row.
+        kept: paths of values whose draws stay the same in a session. session: the number of its episodes.
+    """
+
+    kept: tuple[str, ...] = ()
+    session: int = 1
     rows: dict[tuple[str, int], int] = field(default_factory=dict)
 
     def row(self, path: str, number: int = 0) -> int:
@@ -53,7 +60,13 @@ class Sites:
         paths = {path for path, _ in self.rows}
         numbers = {site_number(path) for path in paths}
         assert len(paths) == len(numbers), "internal: two draw sites share a hash; rename one of their owners"
-        return [word for path, number in self.rows for word in (site_number(path), number)]
+        return [
+            word for path, number in self.rows for word in (site_number(path), number | self._lasts(path))
+        ]
+
+    def _lasts(self, path: str) -> int:
+        """The episodes for which a draw stays the same, as the upper half of its number; 0 if it does not."""
+        return self.session << 16 if path.partition("[")[0] in self.kept else 0
 
 
 class Block:

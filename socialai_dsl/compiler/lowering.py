@@ -128,7 +128,7 @@ class Allocation:
     inbox: int
     inbox_of: dict[str, int]
     inbox_size: int
-    sites: Sites = field(default_factory=Sites)
+    sites: Sites
     code: CodeTable = field(default_factory=CodeTable)
     rules: list[str] = field(default_factory=list)
 
@@ -156,7 +156,10 @@ def allocate(checked: CheckedScenario, notes: NoteTaker, numbered: Lines | None)
     inbox = registers.reserve(0)
     inbox_of = {frame.member: registers.reserve(1 + entry_size * inbox_size) for frame in checked.frames}
     computed = ComputedStatuses(checked)
-    return Allocation(checked, notes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size)
+    sites = Sites(checked.kept, checked.session)
+    return Allocation(
+        checked, notes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size, sites
+    )
 
 
 def seat_registers(checked: CheckedScenario, registers: Registers) -> None:

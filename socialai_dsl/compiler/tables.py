@@ -166,6 +166,7 @@ def program_of(allocation: Allocation, lowered: LoweredCode) -> Program:
         looks=tuple((look.name, look.words) for look in shown),
         names_shown=checked.names_shown,
         tones=_tones(checked.entities),
+        session=checked.session,
     )
 
 

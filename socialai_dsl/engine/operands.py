@@ -32,7 +32,20 @@ def assign(row: Row, operand: int, number: int) -> None:
 def draw_at(row: Row, site: int) -> np.uint64:
     """The random bits of a site in this step."""
     place = row.program[Header.SITE_AT] + 2 * site
-    return rng.draw(row.key[Key.KEY], row.program[place], row.registers[Register.T], row.program[place + 1])
+    number, key = row.program[place + 1], row.key[Key.KEY]
+    if number >> 16:
+        key = session_key(row, number >> 16)
+    return rng.draw(key, row.program[place], row.registers[Register.T], number & 65535)
+
+
+@inline
+def session_key(row: Row, episodes: int) -> np.uint64:
+    """The key of what stays the same in a session of so many episodes; see `draws`."""
+    episode = row.key[Key.EPISODE]
+    first = episode - episode % np.uint64(episodes)
+    return rng.act_key(
+        rng.episode_key(row.key[Key.SEED], row.key[Key.INDEX], first), np.int64(row.key[Key.ACT])
+    )
 
 
 @inline

@@ -301,7 +301,7 @@ class EachRoom:
 
     Args:
         episodes: N.
-        trials: how many rooms in a row are a session.
+        trials: how many rooms in a row are a session; the last session may be shorter.
         sessions: the first rooms of the sessions that are left, where several agendas share them.
         rooms: the set; by default the test set.
     """
@@ -314,14 +314,14 @@ class EachRoom:
         rooms: RoomSet = TEST_ROOMS,
     ) -> None:
         self.trials = trials
-        self._rooms = rooms
+        self._rooms, self._episodes = rooms, episodes
         self._waiting = iter(range(0, episodes, trials)) if sessions is None else sessions
         self._next: dict[int, int] = {}
 
     def following(self, room: int) -> int | None:
         """See `Agenda.following`."""
         number = self._next.get(room, 0)
-        if number % self.trials == 0:
+        if number % self.trials == 0 or number >= self._episodes:
             session = next(self._waiting, None)
             if session is None:
                 return None

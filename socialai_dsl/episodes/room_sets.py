@@ -120,7 +120,10 @@ class RoomSet:
         return {"seed": self.seed, "options": {**chosen, "index": numbers.tolist()}}
 
     def check(self, program: Playable) -> None:
-        """Raise OptionError where a layout is none of this scenario's."""
+        """Raise OptionError where a layout is none of this scenario's, or what is shared in a session would differ."""
+        if self.seed is not None and program.session > 1:
+            said = f"got {self.name}, but {program.name} has sessions, which the test set alone has"
+            raise OptionError("rooms", said)
         if self.layouts is None:
             return
         env = ScenarioEnv(program)

@@ -306,7 +306,7 @@ def play_test_set(
     loaded: Loaded,
     program: Playable,
     episodes: int,
-    trials: int = 1,
+    trials: int | None = None,
     partners: Partners = MappingProxyType({}),
     observers: Sequence[Observer] = (),
     room_set: RoomSet = TEST_ROOMS,
@@ -319,7 +319,7 @@ def play_test_set(
         loaded: the same.
         program: the same, compiled.
         episodes: how many.
-        trials: how many in a row the player remembers.
+        trials: how many in a row the player remembers; by default those of a session of the scenario.
         partners: who sits on other seats than the player. On those that are left it plays as well, a person, a
             language model or a rival on the first of them alone.
         observers: watch as well, where neither a person nor a language model plays.
@@ -330,7 +330,7 @@ def play_test_set(
         RunFailed: a language model has spent its budget.
     """
     endings, briefing = endings_of(loaded, program), player.briefing(loaded)
-    own = own_seat(partners, program)
+    own, trials = own_seat(partners, program), trials or program.session
     if player.is_person:
         person = play_test_episodes(player, partners, scenario, loaded, program, episodes, briefing, room_set)
         found = _of_person(person, scenario, loaded, program, player, own, partners, briefing)
@@ -344,7 +344,7 @@ def play_test_set(
         found = _of_models(played, scenario, loaded, program, player, partners, briefing)
         return replace(found, trials=trials, rooms=room_set)
     kept = Actions()
-    with _playing(player, partners, scenario, loaded, program, episodes // trials) as playing:
+    with _playing(player, partners, scenario, loaded, program, -(-episodes // trials)) as playing:
         result = _result_of(playing, episodes, [kept, *observers], trials, room_set)
     told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
@@ -486,6 +486,8 @@ def evaluate_policy(
             policy's actions are not the scenario's.
     """
     players = policy if isinstance(policy, Mapping) else {AGENT: policy}
+    if not 1 <= trials <= episodes or episodes % trials:
+        raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
     return _result_of(Company(envs, players, envs.seat_names[0]), episodes, observers, trials)
 
 
@@ -499,8 +501,6 @@ def _result_of(
     """See `evaluate_policy`."""
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
-    if not 1 <= trials <= episodes or episodes % trials:
-        raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
     envs = playing.envs
     results = Results(envs.program.outcomes, episodes)
     before = envs.counters()["rules"]

@@ -36,6 +36,9 @@ PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
 PLAYED: Final = "played"
 """The folder in a run's where `socialai evaluate` plays."""
+_ASKED: Final = {"episodes": "eval_episodes", "trials": "trials"}
+"""Options of `socialai evaluate` and what an experiment calls them."""
+
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
 _SECONDS_TO_SAVE: Final = 10.0
 """How long a process that is ended may take to save its checkpoint."""
@@ -237,7 +240,7 @@ class _Work:
         values = {
             name.replace("_", "-"): value for name, value in asked.items() if not isinstance(value, bool)
         }
-        values |= {"episodes": options["eval_episodes"], "trials": options.get("trials", 1)}
+        values |= {name: options[key] for name, key in _ASKED.items() if key in options}
         agent = condition["agent"]
         if agent != "oracle" and not agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)):
             values |= {"seed": self._run.seed} | ({} if agent in UNTRAINED else {"device": options["device"]})

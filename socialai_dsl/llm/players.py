@@ -404,7 +404,7 @@ async def _play(
     async with contextlib.AsyncExitStack() as open_ones:
         clients = [await open_ones.enter_async_context(model.endpoint.client()) for model in models]
         async with asyncio.TaskGroup() as group:
-            for _ in range(min(concurrency, episodes // trials)):
+            for _ in range(min(concurrency, -(-episodes // trials))):
                 group.create_task(work(clients))
     if failures:
         raise failures[0]

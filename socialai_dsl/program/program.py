@@ -132,6 +132,7 @@ class Program:
         looks: name and words of each look that the image shows.
         names_shown: whether a line begins with the name of who says it.
         tones: words of the look that is heard before a line, in brackets.
+        session: how many episodes in a row share some of what is drawn.
     """
 
     words: npt.NDArray[np.int32]
@@ -150,6 +151,7 @@ class Program:
     looks: tuple[tuple[str, tuple[str, ...]], ...] = ()
     names_shown: bool = True
     tones: tuple[str, ...] = ()
+    session: int = 1
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: nothing changes it."""

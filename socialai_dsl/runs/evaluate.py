@@ -76,7 +76,7 @@ def evaluate(
     rooms: str | Path | RoomSet = TEST_ROOMS,
     out: str | Path | None = None,
     record: int = RECORDED,
-    trials: int = 1,
+    trials: int | None = None,
     seats: Mapping[str, str | Player] = MappingProxyType({}),
     **options: Any,
 ) -> Evaluation:
@@ -94,9 +94,9 @@ def evaluate(
         out: a folder that gets a folder of the scenario with `result.json`, films, transcripts, a page that replays
             episodes and a list of all; reports take it. A language model and a person have one in any case.
         record: the most successes, and the most failures, that are filmed there.
-        trials: how many episodes in a row, a session, the player remembers; a divisor of `episodes`. Results are
-            reported for each trial of a session, so they show what the player learns within one. A person remembers
-            a session in any case.
+        trials: how many episodes in a row, a session, the player remembers; a divisor of `episodes`. By default as
+            many as the scenario says (`session`), or 1. Results are reported for each trial of a session, so they show
+            what the player learns within one. A person remembers a session in any case.
         seats: who plays members of the cast with seats, `{"helper": "runs/help"}`: `script`, `random`, a trained agent,
             `llm:MODEL`, or a `Player`; the agent also `rival:NAME`. The one that is tested plays on the seats that are
             left, a language model or a rival on the first of them alone, and results are those of the first.
@@ -127,7 +127,7 @@ def evaluate_each(
     episodes: int | None,
     record: int = RECORDED,
     out: Path | None = None,
-    trials: int = 1,
+    trials: int | None = None,
     seats: Sequence[tuple[str, str | Player]] = (),
     rooms: RoomSet = TEST_ROOMS,
 ) -> Generator[Evaluation, None, None]:
@@ -135,9 +135,9 @@ def evaluate_each(
     episodes = min(TEST_SET, rooms.count) if episodes is None else episodes
     if not isinstance(episodes, int) or not 1 <= episodes <= rooms.count:
         raise OptionError("episodes", f"got {episodes!r}, expected a whole number from 1 to {rooms.count}")
-    if not isinstance(trials, int) or trials < 1 or episodes % trials:
+    if trials is not None and (not isinstance(trials, int) or trials < 1 or episodes % trials):
         raise OptionError("trials", f"got {trials!r}, expected a divisor of the {episodes} episodes")
-    if player.is_person and trials > 1:
+    if player.is_person and (trials or 1) > 1:
         raise OptionError("trials", f"got {trials}, but a person remembers all episodes of a session")
     partners = [partner for _, partner in seats if isinstance(partner, Player)]
     keeping = (one.kept_in for one in (player, *partners) if one.is_model or one.is_person)
@@ -165,7 +165,7 @@ def _evaluated(
     player: Player,
     scenario: str,
     episodes: int,
-    trials: int,
+    trials: int | None,
     record: int,
     out: Path | None,
     seats: Sequence[tuple[str, str | Player]],

@@ -46,6 +46,7 @@ CALLED: Final[dict[type, str]] = {
     s.Property: "a property of `check`",
     s.Published: "a published figure",
     s.OnlyThrough: "`only_through`",
+    s.Session: "`session`",
     s.Dilemma: "`dilemma`",
     s.Probe: "a probe",
     s.DialogueTest: "an entry of `tests`",

@@ -1001,6 +1001,15 @@ class Published(Model):
     source: Prose = Field(description="where the figure is published")
 
 
+class Session(Model):
+    """Several episodes in a row in which some draws stay the same, so that a player can learn them."""
+
+    episodes: int = Field(ge=2, le=1000, description="the number of episodes in a session")
+    same: LetNames = Field(
+        description="one or several `let`: each keeps its value from the first episode of a session to its last"
+    )
+
+
 class Scenario(Model):
     """One environment: a room with objects, a cast that follows frames, and an outcome."""
 
@@ -1053,6 +1062,11 @@ class Scenario(Model):
     )
     let: dict[Word, Expression | Sequence] = Field(
         default_factory=dict, description="name: a value that is drawn or computed once, at reset"
+    )
+    session: Annotated[Session | None, Hides(False)] = Field(
+        None,
+        description="how many episodes in a row share draws, and which",
+        examples=[{"episodes": 3, "same": ["secret"]}],
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
     state: dict[Word, Expression | Register] = Field(

@@ -69,6 +69,7 @@ from socialai_dsl.semantics.terms import (
     Quantification,
     SitedTerm,
     Type,
+    walk,
 )
 from socialai_dsl.semantics.texts import texts_in_order
 from socialai_dsl.semantics.unseen import check_unseen
@@ -123,6 +124,20 @@ def _told_apart(resolver: Resolver, drawn: Iterable[Drawn]) -> Iterator[str]:
     for path, name in resolver.findings.each(("results_by",), resolver.symbols.scenario.results_by):
         with surviving():
             yield _let(resolver, path, name, lets).removeprefix("let.")
+
+
+def _kept(resolver: Resolver, drawn: Iterable[Drawn]) -> Iterator[str]:
+    """The registers of the draws that stay the same in a session."""
+    session = resolver.symbols.scenario.session
+    lets = dict.fromkeys(
+        item.path.partition("[")[0]
+        for item in drawn
+        if item.path.startswith("let.")
+        and any(isinstance(part, Quantification) and part.op == "pick" for part in walk(item.value))
+    )
+    for path, name in resolver.findings.each(("session", "same"), session.same if session else ()):
+        with surviving():
+            yield _let(resolver, path, name, lets)
 
 
 def _let(resolver: Resolver, path: DataPath, word: str, lets: Collection[str]) -> str:
@@ -477,7 +492,7 @@ class _Run:
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
-        by = tuple(_told_apart(resolver, drawn))
+        by, kept = tuple(_told_apart(resolver, drawn)), tuple(_kept(resolver, drawn))
         claimed = tuple(properties(resolver, outcomes, drawn, self._patches))
         asked = probes(resolver)
         tested = dialogues(resolver, outcomes)
@@ -546,6 +561,8 @@ class _Run:
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
             results_by=by,
+            session=scenario.session.episodes if scenario.session else 1,
+            kept=kept,
             probes=asked,
             tests=tested,
             accepting=accepting,

@@ -589,6 +589,7 @@ class CheckedScenario:
         readings: how conditions were written; None if it was not made from a file.
         addressing: a slot, and the member that each of its words addresses. overheard: whether others hear that.
         seated: the members of the cast other than the agent that have a seat, by number.
+        session: episodes of a session. kept: registers whose draws stay the same in it.
     """
 
     name: str
@@ -628,6 +629,8 @@ class CheckedScenario:
     addressing: tuple[str, tuple[int, ...]] | None = None
     overheard: bool = True
     seated: tuple[int, ...] = ()
+    session: int = 1
+    kept: tuple[str, ...] = ()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Itself: nothing changes it."""

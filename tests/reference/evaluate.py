@@ -69,7 +69,8 @@ def drawn(context: Context, node: ast.Node, size: int) -> int:
     """A choice among `size` things by a node that draws: its site is the value's path, its number the node's."""
     assert context.value is not None, "internal: a draw outside any value"
     number = context.value.ordinals[id(node)]
-    return chance.choose(context.world.key, context.value.site, context.world.t, number, size)
+    site = context.value.site
+    return chance.choose(context.world.key_at(site), site, context.world.t, number, size)
 
 
 # -- plain nodes -------------------------------------------------------------------------------------------

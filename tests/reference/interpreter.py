@@ -84,9 +84,13 @@ class Reference:
         layout: dict[str, Any] | None = None,
     ) -> list[Result]:
         """Draws the room until all that is required of it holds; at reset the history is empty."""
-        key = chance.episode(chance.TEST_SET if test else seed, index, episode)
+        begun, session = chance.TEST_SET if test else seed, self.scenario.session
+        key = chance.episode(begun, index, episode)
+        first = episode - episode % session.episodes if session else episode
+        kept = frozenset(f"let.{name}" for name in session.same) if session else frozenset()
         for attempt in range(ATTEMPTS):
             self.world = self.new_world(chance.attempt(key, attempt))
+            self.world.session_key, self.world.kept = chance.episode(begun, index, first), kept
             self.prepare(layout or {})
             self.world.key = key
             if self.accepted():

@@ -83,7 +83,7 @@ class Setup:
 
     def draw(self, path: str, number: int, size: int) -> int:
         """A draw at reset."""
-        return chance.choose(self.world.key, path, 0, number, size)
+        return chance.choose(self.world.key_at(path), path, 0, number, size)
 
     # -- room ----------------------------------------------------------------------------------------------
 
@@ -500,7 +500,9 @@ class Setup:
         for k in range(sequence.length):
             move = sequence.moves[self.draw(f"let.{name}[{k}].move", 0, len(sequence.moves))]
             site, spoken, pairs = f"let.{name}[{k}].utterance", 0, self.scenario.grammar.pairs()
-            if sequence.chance is not None and chance.happens(self.world.key, site, 0, sequence.chance):
+            if sequence.chance is not None and chance.happens(
+                self.world.key_at(site), site, 0, sequence.chance
+            ):
                 spoken = 1 + self.draw(site, 1, len(pairs))
             pinned = self.pinned_lets
             elements.append(

@@ -344,6 +344,14 @@ class Probe:
 
 
 @dataclass(frozen=True)
+class Session:
+    """Episodes in a row in which some draws stay the same."""
+
+    episodes: int
+    same: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Script:
     """One scenario."""
 
@@ -358,6 +366,7 @@ class Script:
     order: tuple[str, ...] = ()
     objects: dict[str, Group] = field(default_factory=dict)
     let: dict[str, Any] = field(default_factory=dict)
+    session: Session | None = None
     define: dict[str, Any] = field(default_factory=dict)
     state: dict[str, Any] = field(default_factory=dict)
     looks: dict[str, Look] = field(default_factory=dict)
@@ -659,6 +668,7 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "require": many,
     "reward": lambda entry: record(Pay, entry, {}),
     "outcome": lambda entries: tuple(record(Outcome, entry, {"for_": many}) for entry in entries),
+    "session": lambda entry: record(Session, entry, {"same": many}),
     "observe": lambda entry: record(Observe, entry, {"channels": many}),
     "probes": each(lambda entry: record(Probe, entry, {"answers": many})),
 }

@@ -232,6 +232,8 @@ class World:
     """The whole state of an episode."""
 
     key: int
+    session_key: int = 0  # of what stays the same in a session
+    kept: frozenset[str] = frozenset()  # the places of those draws
     t: int = 0
     width: int = 0
     height: int = 0
@@ -265,6 +267,10 @@ class World:
     look_names: dict[str, tuple[str, ...]] = field(default_factory=dict)
     shown_looks: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words of those that it shows
     canvas: tuple[int, int] = (0, 0)
+
+    def key_at(self, path: str) -> int:
+        """The key of a draw at a place of the scenario."""
+        return self.session_key if path.partition("[")[0] in self.kept else self.key
 
     @property
     def agent(self) -> Entity:

@@ -129,6 +129,12 @@ class _Author:
         if self.often(0.3):
             made["reward"] = {"success": "linear(0.5)", "each_step": self.rng.choice((-0.001, 0.002))}
         made["observe"] = self.observe()
+        shared = [
+            name for name, value in lets.items() if not isinstance(value, str) or value.startswith("pick(")
+        ]
+        if shared and self.often(0.2):
+            same = self.rng.sample(shared, self.rng.randint(1, len(shared)))
+            made["session"] = {"episodes": self.rng.randint(2, 3), "same": same}
         return made
 
     # -- what there is -----------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ def played(config: RunConfig) -> tuple[Session, Rollout]:
     session.actor.net.train()
     for _ in range(2):
         rollout = collect(session)
-    assert rollout.starts[1:].any(), "episodes must begin within the rollout"
+    assert rollout.forgets[1:].any(), "episodes must begin within the rollout"
     return session, rollout
 
 
@@ -89,7 +89,7 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
 ) -> None:
     config = small(epochs=3)
     session, rollout = played(config)
-    rollout = rollout._replace(starts=torch.zeros_like(rollout.starts))  # memories go on for ever
+    rollout = rollout._replace(forgets=torch.zeros_like(rollout.forgets))  # memories go on for ever
     steps = Steps(session, monkeypatch)
     update(session, rollout)
     first, second, third = (steps.calls[epoch * 4 : epoch * 4 + 4] for epoch in range(3))
@@ -109,9 +109,9 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
 def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(epochs=1)
     session, rollout = played(config)
-    marks = torch.zeros_like(rollout.starts)
+    marks = torch.zeros_like(rollout.forgets)
     marks[6] = True  # the third step of each chunk that begins at 4
-    rollout = rollout._replace(starts=marks)
+    rollout = rollout._replace(forgets=marks)
     steps = Steps(session, monkeypatch)
     update(session, rollout)
     empty = [(given == 0).flatten(1).all(1).sum().item() for given, _ in steps.calls]
@@ -234,7 +234,7 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: RunConfig
         total = torch.zeros((), dtype=torch.float64)
         for step in range(4):
             frames = [(t + step, e) for t, e in starts]
-            kept = torch.tensor([not rollout.starts[frame] for frame in frames]).double()[:, None, None]
+            kept = torch.tensor([not rollout.forgets[frame] for frame in frames]).double()[:, None, None]
             images = torch.from_numpy(np.stack([actor.images.data[pairs[frame][0]] for frame in frames]))
             texts = torch.stack(
                 [encode(net.dialogue, actor.histories.data[pairs[frame][1]]) for frame in frames]

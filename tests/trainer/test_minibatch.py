@@ -55,7 +55,7 @@ def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarra
     for t, observation in enumerate(seen):
         if t % STRETCH == 0:
             memory = rollout.memories[t // STRETCH]
-        memory = emptied(memory, rollout.starts[t])
+        memory = emptied(memory, rollout.forgets[t])
         features = [
             net.perceive(
                 net.prepare(torch.from_numpy(image[None])), encode(net.dialogue, tokens)[None], only, only
@@ -83,7 +83,7 @@ def furthest(one: Tensor, other: Tensor) -> float:
 def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> None:
     session, rollout, seen = play(net_name, distinct)
     net = session.actor.net
-    assert rollout.starts.any(), "episodes must begin within the rollout"
+    assert rollout.forgets.any(), "episodes must begin within the rollout"
     assert max(np.count_nonzero(o["tokens"], axis=1).max() for o in seen) > 8, "histories must be long"
     zeros = torch.zeros(STEPS, ENVS)
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, zeros, zeros)

@@ -46,6 +46,21 @@ def play(config: Any, envs: EchoEnvs, rollouts: int = 1) -> tuple[Session, Rollo
     return session, rollout
 
 
+@pytest.mark.parametrize("episodes", [1, 2, 3])
+def test_an_agent_forgets_where_a_session_begins(episodes: int, small_config: Any) -> None:
+    envs = EchoEnvs(8, limit=2)
+    envs.program.session = episodes
+    session = Session.start(small_config(), envs)
+    rollouts = [collect(session) for _ in range(3)]
+    forgets, ended = (torch.cat([getattr(one, name) for one in rollouts]) for name in ("forgets", "ended"))
+    assert ended.sum() > 8 * episodes
+    before = torch.cat((torch.zeros(1, 8), ended.cumsum(0)[:-1]))  # episodes that have ended
+    begins = torch.cat((torch.ones(1, 8, dtype=torch.bool), ended[:-1]))
+    assert torch.equal(forgets, begins & (before % episodes == 0))
+    for rollout in rollouts:  # what is remembered is not empty, but where a session begins
+        assert torch.equal(rollout.memories[0].flatten(1).abs().sum(1) == 0, rollout.forgets[0])
+
+
 def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
     envs = Witness(8)
     session, rollout = play(small_config(), envs)
@@ -54,11 +69,11 @@ def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
         assert (rollout.rewards[t].numpy() == reward.astype(np.float32)).all()
         assert (rollout.ended[t].numpy() == (terminated | truncated)).all()
         if t + 1 < len(envs.steps):
-            assert torch.equal(rollout.starts[t + 1], rollout.ended[t])
+            assert torch.equal(rollout.forgets[t + 1], rollout.ended[t])
         pairs = session.actor.pairs.data[rollout.pair_rows[t]]
         assert (session.actor.images.data[pairs[:, 0]] == envs.seen[t]["image"]).all()
         assert (session.actor.histories.data[pairs[:, 1]] == envs.seen[t]["tokens"]).all()
-    assert rollout.starts[0].all()
+    assert rollout.forgets[0].all()
     assert (session.state.starts == rollout.ended[-1].numpy()).all()
     assert rollout.tally.episodes == rollout.ended.sum() == envs.counters()["episodes"]
     assert rollout.tally.timeouts == sum(step[3].sum() for step in envs.steps)
@@ -80,12 +95,12 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
     seen = np.zeros((8, model.sight.size), np.int64)
     with torch.no_grad():
         for t in range(24):
-            seen[rollout.starts[t].numpy()] = 0
+            seen[rollout.forgets[t].numpy()] = 0
             envs.seen[t]["image"], seen = model.sight.look(
                 envs.seen[t]["image"], envs.seen[t]["tokens"], seen
             )
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
-            memory = emptied(memory, rollout.starts[t])
+            memory = emptied(memory, rollout.forgets[t])
             output, memory = model.memory.step(features, memory)
             logits, values = model.heads(output)
             assert torch.allclose(values, rollout.values[t], atol=1e-5), f"step {t}"
@@ -108,7 +123,7 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     checked = 0
     with torch.no_grad():
         for t in range(config.horizon):
-            memory = emptied(memory, rollout.starts[t])
+            memory = emptied(memory, rollout.forgets[t])
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
             _, memory = model.memory.step(features, memory)
             for e in np.flatnonzero(envs.steps[t][3]):

@@ -99,6 +99,19 @@ def test_a_run_stopped_three_times_ends_with_the_same_bits(
     assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
 
 
+def test_a_run_whose_agent_remembers_several_episodes_resumes(tmp_path: Path, small_config: Any) -> None:
+    def envs() -> EchoEnvs:
+        made = EchoEnvs(8, limit=3)
+        made.program.session = 3
+        return made
+
+    whole = read(train(small_config(frames=64 * 4), envs(), tmp_path / "whole"))
+    train(small_config(frames=64 * 2), envs(), tmp_path / "parts")
+    longer = read(train(small_config(frames=64 * 4), envs(), tmp_path / "parts", resume=True))
+    assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
+    assert whole.tensors["state.trials"].any()
+
+
 def test_a_run_that_has_heard_nothing_yet_resumes(tmp_path: Path, small_config: Any) -> None:
     """What encodes words has had no gradient, so that Adam knows nothing of it."""
     whole = read(train(small_config(frames=64 * 4), EchoEnvs(8, limit=1), tmp_path / "whole"))
