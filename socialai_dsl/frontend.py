@@ -33,6 +33,7 @@ from socialai_dsl.checking.studies import (
     LoadedStudy,
     check_block_names,
     check_seats,
+    check_sessions,
     check_study,
     is_model,
     players_of,
@@ -688,7 +689,9 @@ def _check_study_played(
             bag.error("S108", message, span)
             continue
         played[number] = loaded
-        if number == PRACTICE or not check_seats(study, number, loaded, bag):
+        if number == PRACTICE or not (
+            check_seats(study, number, loaded, bag) and check_sessions(study, number, loaded, bag)
+        ):
             continue
         block = study.study.blocks[number]
         rival = rival_of_agent(block)

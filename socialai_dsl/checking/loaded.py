@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import lcm
 from typing import Any
 
 from socialai_dsl.diagnostics import Diagnostic
@@ -84,6 +85,12 @@ class LoadedSuite:
 
 Loaded = LoadedScenario | LoadedSuite
 """What `load` returns."""
+
+
+def session_of(loaded: Loaded) -> int:
+    """How many episodes in a row share draws; of a suite so many that the sessions of all its members fit into one."""
+    members = (loaded,) if isinstance(loaded, LoadedScenario) else loaded.members
+    return lcm(*(member.checked.session for member in members))
 
 
 def about_of(loaded: Loaded) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.checking.experiments import from_anywhere, prices_from_anywhere
-from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, session_of
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, advice_on
 from socialai_dsl.errors import OptionError
 from socialai_dsl.loader.prices import prices_of
@@ -228,6 +228,24 @@ def check_seats(study: LoadedStudy, number: int, loaded: Loaded, bag: Diagnostic
         if seat == AGENT and rival is not None:
             _check_rival(rival, loaded, span, bag)
     return len(bag) == known
+
+
+def check_sessions(study: LoadedStudy, number: int, loaded: Loaded, bag: DiagnosticBag) -> bool:
+    """Whether a block keeps the sessions of its scenario together; `bag` says why not."""
+    block, tree, session = study.study.blocks[number], study.resolved.tree, session_of(loaded)
+    if session == 1:
+        return True
+    said, place = f"the {session} episodes of a session of `{loaded.name}`", ("blocks", number)
+    if block.shuffle:
+        message, hint = f"`shuffle` parts {said}", "leave `shuffle` out"
+        bag.error("S107", message, tree.key_span((*place, "shuffle")), hint=hint)
+        return False
+    if block.episodes % session:
+        hint = f"`episodes: {-(-block.episodes // session) * session}`"
+        message = f"{block.episodes} episodes are no multiple of {said}"
+        bag.error("S106", message, tree.value_span((*place, "episodes")), hint=hint)
+        return False
+    return True
 
 
 def _written(block: Block) -> Iterator[tuple[str, Mapping[str, str]]]:

@@ -123,3 +123,19 @@ def test_mistakes(session: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "sessions.yaml").write_text(text, encoding="utf-8")
     found = [f"{one.code} {one.message}" for one in check(tmp_path / "sessions.yaml").diagnostics]
     assert any(line.startswith(said) for line in found), found
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("episodes: 6", None),
+        ("episodes: 6, shuffle: true", "S107 `shuffle` parts the 3 episodes of a session of `sessions`"),
+        ("episodes: 7", "S106 7 episodes are no multiple of the 3 episodes of a session of `sessions`"),
+    ],
+)
+def test_a_study_keeps_sessions_together(block: str, said: str | None, tmp_path: Path) -> None:
+    (tmp_path / "sessions.yaml").write_text(BOXES.read_text(encoding="utf-8"), encoding="utf-8")
+    study = f"study: boxes\nconsent: I agree.\nblocks: [{{scenario: sessions.yaml, {block}}}]\n"
+    (tmp_path / "boxes.yaml").write_text(study, encoding="utf-8")
+    found = [f"{one.code} {one.message}" for one in check(tmp_path / "boxes.yaml").diagnostics]
+    assert found == ([] if said is None else [said])
