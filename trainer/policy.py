@@ -48,6 +48,11 @@ class NetPolicy:
         self._seen[mask] = 0
         self._streams.begin(mask, episodes)
 
+    def enter(self, mask: NDArray[np.bool_]) -> None:
+        """Forget the map of a room, but not what is remembered, as in training; see `Entering.enter`."""
+        self._require(len(mask))
+        self._seen[mask] = 0
+
     @torch.no_grad()
     def act(self, observation: Observation) -> Int64:
         """Choose actions, int64 (E, heads), as `Policy.act` does; of a single observation one, int64 (heads,)."""

@@ -475,9 +475,12 @@ def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: 
         )
     rooms.begin(agenda.reset(begun, numbers), numbers, begun)
     forgetting = begun & (numbers % agenda.trials == 0)
-    if forgetting.any():
-        for policy in players.values():
+    entering = begun & ~forgetting
+    for policy in players.values():
+        if forgetting.any():
             policy.reset(forgetting.copy(), numbers.copy())
+        if entering.any() and (enter := getattr(policy, "enter", None)) is not None:
+            enter(entering.copy())
 
 
 async def _all_asked(rooms: Rooms, players: Mapping[Seat, Policy], wait: float | None) -> dict[Seat, Int64]:

@@ -48,6 +48,17 @@ class EpisodeOver(Exception):  # noqa: N818 - no error
     """A policy ends its episode without an action."""
 
 
+class Entering(Protocol):
+    """A policy that keeps something of the room it is in, besides what it remembers of several episodes."""
+
+    def enter(self, mask: NDArray[np.bool_]) -> None:
+        """Forget the rooms, but nothing else, of environments in which an episode begins within a session.
+
+        Args:
+            mask: bool (E,), true for those environments.
+        """
+
+
 class Leaving(Protocol):
     """A policy that acts once more when an episode has ended, for example to answer questions about it."""
 

@@ -86,6 +86,21 @@ def test_a_player_forgets_before_each_session() -> None:
         evaluate_policy(policy, envs(1), 4, trials=3)
 
 
+def test_a_player_is_told_of_each_episode_of_a_session() -> None:
+    class Maps(Still):
+        """Notes which episodes it enters without forgetting."""
+
+        def enter(self, mask: Any) -> None:
+            self.entered = [*getattr(self, "entered", []), mask.tolist()]
+
+    policy = Maps()
+    play(Rooms(envs(2)), {AGENT: policy}, EachRoom(6, trials=3))
+    assert policy.forgotten == [0, 3]
+    assert np.sum(policy.entered, axis=0).tolist() == [2, 2]
+    play(Rooms(envs(2)), {AGENT: (alone := Maps())}, EachRoom(4))
+    assert not hasattr(alone, "entered")
+
+
 def test_the_first_episodes_of_each_room_are_numbered_room_by_room() -> None:
     play(Rooms(envs(2), [log := Log()]), {AGENT: Still()}, EpisodesInARow(seed=1, each=2))
     assert log.begun == [[0, 2], [1, 3]]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+import socialai_dsl as sd
 from socialai_dsl.trainer.nets import NetSpec
 from socialai_dsl.trainer.nets.dialogue import HeardWords, prefix_tree
 from socialai_dsl.trainer.nets.fast import Cells
@@ -11,6 +12,7 @@ from socialai_dsl.trainer.nets.lines import HeardOrder, Together
 from socialai_dsl.trainer.nets.naming import NamingSight
 from socialai_dsl.trainer.nets.relations import RelationsNet
 from socialai_dsl.trainer.nets.sight import MapSight, Sight
+from socialai_dsl.trainer.policy import NetPolicy
 from tests.trainer.nets.test_dialogue import conversations, encode_one_by_one, encode_tree
 
 WORDS = ("<pad>", "<unk>", "<Ann>", "<Bob>", "ann", "bob", "yes", "no", "hello", "red", "blue", "door")
@@ -115,3 +117,20 @@ def test_a_mention_is_read_where_it_is_and_by_what_words_mean_together() -> None
     assert not torch.allclose(left[0], left[1])
     assert not torch.allclose(left[0], right[0])
     assert torch.allclose(left[2], right[2]), "nothing was mentioned"
+
+
+def test_a_map_is_of_one_room_and_a_memory_of_a_session() -> None:
+    """In training and in play."""
+    envs = sd.make_vec("school/color_match", 2, autoreset_mode="Disabled")
+    net = RelationsNet(NetSpec.of(envs))
+    policy, mask = NetPolicy(net), np.array([True, False])
+    observation, _ = envs.reset(seed=0)
+    policy.reset(np.ones(2, np.bool_), np.arange(2))
+    for _ in range(3):
+        observation, *_ = envs.step(policy.act(observation))
+    before = policy.state()
+    assert before["seen"].any(1).all()
+    policy.enter(mask)
+    after = policy.state()
+    assert np.array_equal(before["memory"], after["memory"])
+    assert after["seen"].any(1).tolist() == [False, True]
