@@ -486,7 +486,7 @@ def evaluate_policy(
             policy's actions are not the scenario's.
     """
     players = policy if isinstance(policy, Mapping) else {AGENT: policy}
-    if not 1 <= trials <= episodes or episodes % trials:
+    if episodes >= 1 and (not 1 <= trials <= episodes or episodes % trials):
         raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
     return _result_of(Company(envs, players, envs.seat_names[0]), episodes, observers, trials)
 
