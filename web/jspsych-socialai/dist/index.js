@@ -725,6 +725,7 @@ var Screen = class {
     this.canvas = make("canvas", { role: "img", "aria-label": words.sees });
     this.seen = make("pre", { class: "seen", "aria-live": "polite" });
     this.heard = make("ol", { class: "lines", tabindex: 0, "aria-live": "polite", "aria-label": words.heard });
+    this.listed = [];
     this.told = make("p", { class: "quiet" });
     this.moves = make("div", { class: "moves", role: "group", "aria-label": words.movements });
     this.speech = make("form", { class: "say", onsubmit: (event) => this.speak(event) });
@@ -772,6 +773,7 @@ var Screen = class {
     clearInterval(this.counting);
     this.title.textContent = this.words.title;
     this.state.textContent = "";
+    this.body.setAttribute("aria-live", "polite");
     this.body.replaceChildren(...this.pages[now.do](now));
   }
   /** @param {Reply} now */
@@ -795,6 +797,7 @@ var Screen = class {
     this.state.textContent = this.say("step", { number: now.t });
     this.told.textContent = now.told;
     if (!same || now.actions) {
+      this.body.setAttribute("aria-live", "off");
       this.body.replaceChildren(this.told, this.canvas, this.moves, this.speech, this.buttons, panel(this.words.heard, "transcript", this.heard), this.seen, this.keys);
       this.choices();
     }
@@ -802,9 +805,7 @@ var Screen = class {
     this.seen.hidden = !now.seen;
     if (now.view) drawPicture(this.canvas, pictureOf(now.view), { tile: TILE });
     this.seen.textContent = now.seen ?? "";
-    const lines = now.heard.map(([step, line]) => make("li", { class: step === now.t ? "now" : "" }, line));
-    this.heard.replaceChildren(...lines.length ? lines : [make("li", { class: "quiet" }, this.words.nothing_heard)]);
-    this.heard.scrollTop = this.heard.scrollHeight;
+    this.hear(now);
     this.moves.hidden = this.speech.hidden = Boolean(now.ended);
     this.buttons.replaceChildren();
     if (now.ended) this.ended(now);
@@ -813,6 +814,18 @@ var Screen = class {
     requestAnimationFrame(() => {
       this.shown = performance.now();
     });
+  }
+  /** List what was heard. What is listed already stays, so that a screen reader reads new lines alone. @param {Reply} now */
+  hear(now) {
+    const lines = now.heard.length ? now.heard : [["", this.words.nothing_heard]], keys = lines.map(String);
+    while (this.listed.some((key, place) => key !== keys[place])) {
+      this.heard.firstChild?.remove();
+      this.listed.shift();
+    }
+    this.heard.append(...lines.slice(this.listed.length).map(([, line]) => make("li", {}, line)));
+    this.listed = keys;
+    for (const [place, item] of [...this.heard.children].entries()) item.className = !now.heard.length ? "quiet" : lines[place][0] === now.t ? "now" : "";
+    this.heard.scrollTop = this.heard.scrollHeight;
   }
   /** @param {Reply} now */
   ended(now) {
