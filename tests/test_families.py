@@ -10,7 +10,12 @@ from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.frontend import check, load
 from socialai_dsl.loader.shipped import variants_of
 
-FAMILIES = sorted((Path(__file__).parents[1] / "experiments" / "families").glob("*.yaml"))
+FAMILIES = sorted((Path(__file__).parents[1] / "experiments" / "families").glob("*_family.yaml"))
+EVERYTHING = FAMILIES[0].with_name("everything.yaml")
+
+
+def test_all_tasks_of_the_suite_of_everything_have_a_script() -> None:
+    assert check(str(EVERYTHING)).diagnostics == check(f"{EVERYTHING}+oracle").diagnostics == ()
 
 
 @pytest.mark.parametrize("file", FAMILIES, ids=lambda file: file.stem)
