@@ -64,7 +64,7 @@ class ProgramSuite:
 
     @property
     def session(self) -> int:
-        """How many episodes in a row share draws: so many that the sessions of all programs fit into one."""
+        """The number of successive episodes that share draws: the least common multiple of the programs' numbers."""
         return lcm(*(program.session for program in self.programs))
 
     @cached_property

@@ -53,7 +53,7 @@ def _seats_of(envs: Any) -> int:
 
 
 def session_of(envs: Any) -> int:
-    """How many episodes in a row an agent remembers: those that share draws."""
+    """The number of successive episodes that share draws, which an agent remembers."""
     return int(getattr(envs.program, "session", 1))
 
 

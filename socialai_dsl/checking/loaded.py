@@ -88,7 +88,7 @@ Loaded = LoadedScenario | LoadedSuite
 
 
 def session_of(loaded: Loaded) -> int:
-    """How many episodes in a row share draws; of a suite so many that the sessions of all its members fit into one."""
+    """The number of successive episodes that share draws; of a suite the least common multiple over its members."""
     members = (loaded,) if isinstance(loaded, LoadedScenario) else loaded.members
     return lcm(*(member.checked.session for member in members))
 

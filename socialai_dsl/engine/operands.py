@@ -40,7 +40,7 @@ def draw_at(row: Row, site: int) -> np.uint64:
 
 @inline
 def session_key(row: Row, episodes: int) -> np.uint64:
-    """The key of what stays the same in a session of so many episodes; see `draws`."""
+    """The key of draws that stay the same in a session of this many episodes; see `draws`."""
     episode = row.key[Key.EPISODE]
     first = episode - episode % np.uint64(episodes)
     return rng.act_key(

@@ -86,9 +86,7 @@ class Header(IntEnum):
     OUTCOME_AT = 34  # (C, 8) pc by utterance class and Body
     LINE_AT = 35  # (lines, LINE_COLUMNS), see LineColumn
     TOKEN_AT = 36  # (sum of line lengths,) token ids
-    SITE_AT = (
-        37  # (sites, 2): site, number (draws.py) | episodes of the session in which it stays the same << 16
-    )
+    SITE_AT = 37  # (sites, 2): site, number | episodes in which it stays the same << 16 (draws.py)
     RESET_PC = 38
     SETTLE_PC = 39  # computed statuses; run when Register.CHANGED is set, always with Flag.SETTLE_ALWAYS
     RULES_PC = 40  # once a step after all turns: memories, then the rules of the world

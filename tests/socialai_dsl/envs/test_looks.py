@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.llm.view import TextView
 
 LOOKS = Path(__file__).parents[2] / "data" / "looks.yaml"
 
@@ -67,16 +69,20 @@ def test_looks_of_one_name_and_other_words_have_channels_of_their_own(folder: Pa
     channels: tuple[str, ...] = env.channels  # type: ignore[attr-defined]
     hats = [name for name in channels if name.startswith("hat")]
     assert hats == ["hat", "hat: cap crown"]
-    seen = dict[str, set[str]]()
+    told, seen = TextView(env.program), dict[str, set[str]]()  # type: ignore[attr-defined]
     for seed in range(30):
         observation, info = env.reset(seed=seed)
         for _ in range(5):
+            said = set(
+                re.findall(r"\bhat[:\w ]*", told.observe(observation, info))
+            )  # what a language model reads
+            assert said <= {"hat hood" if info["member"] == "a" else "hat crown"}
             view = env.view(observation["image"])  # type: ignore[attr-defined]
             marks = [mark for marks in view.marks.values() for mark in marks if mark.look == "hat"]
             seen.setdefault(info["member"], set()).update(mark.word for mark in marks)
             absent = hats[info["member"] == "a"]
             assert np.all(observation["image"][..., channels.index(absent)] == 255)
-            observation, *_ = env.step(env.action_space.sample())
+            observation, *_, info = env.step(env.action_space.sample())
     assert seen == {"a": {"hood"}, "c": {"crown"}}  # what each starts with, in its own words
     vector = sd.make_vec([str(folder / "a.yaml"), str(folder / "c.yaml")], num_envs=2)
     assert vector.single_observation_space == env.observation_space

@@ -80,7 +80,7 @@ def test_a_schema_holds_it_to_objects(endpoint: Endpoint, tmp_path: Path) -> Non
     assert played("help", prompting, tmp_path / "episode.jsonl", endpoint, 2).invalid == 0
 
 
-def test_it_takes_part_in_a_study_and_sits_beside_somebody(endpoint: Endpoint, tmp_path: Path) -> None:
+def test_a_model_plays_in_a_study_as_a_participant_and_beside_one(endpoint: Endpoint, tmp_path: Path) -> None:
     pytest.importorskip("uvicorn", reason="studies need the extra studio")
     from socialai_dsl.frontend import load_study
     from socialai_dsl.study.rehearsal import rehearse
