@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 from pydantic import ValidationError
 
@@ -119,13 +119,11 @@ class Run:
         """The last complete row of `metrics.jsonl`; None if there is none."""
         try:
             with open(self.folder / METRICS, "rb") as file:
-                size = file.seek(0, os.SEEK_END)
-                file.seek(max(0, size - 65_536))
-                lines = file.read().split(b"\n")[:-1]
+                line = _last_whole_line(file)
         except OSError:
             return None
         try:
-            row = json.loads(lines[-1]) if lines else None
+            row = json.loads(line) if line else None
         except ValueError:
             return None
         return row if isinstance(row, dict) else None
@@ -338,3 +336,14 @@ def _remove_empty(folders: Iterable[Path]) -> None:
         for one in folders:
             if one.exists():
                 one.rmdir()
+
+
+def _last_whole_line(file: IO[bytes]) -> bytes:
+    """The last line that is written to its end, however long it is; empty if there is none."""
+    start = file.seek(0, os.SEEK_END)
+    tail = b""
+    while start and tail.count(b"\n") < 2:
+        start, end = max(0, start - 65_536), start
+        file.seek(start)
+        tail = file.read(end - start) + tail
+    return b"".join(tail.split(b"\n")[-2:-1])

@@ -77,12 +77,14 @@ def test_a_spoilt_status(run: PlannedRun, content: str | bytes) -> None:
     assert run.shown_status.state == "failed"
 
 
-def test_the_last_whole_line_of_the_metrics(run: PlannedRun) -> None:
-    rows = [json.dumps({"frames": frames, "padding": "x" * 5000}) for frames in range(40)]
-    (run.folder / "metrics.jsonl").write_text("\n".join(rows) + '\n{"frames": 40, "pa')
+@pytest.mark.parametrize("length", [0, 5_000, 65_536, 200_000])
+@pytest.mark.parametrize("unfinished", ["", '{"frames": 3, "pa', "x" * 70_000])
+def test_the_last_whole_line_of_the_metrics(run: PlannedRun, length: int, unfinished: str) -> None:
+    rows = [json.dumps({"frames": frames, "padding": "x" * length}) for frames in range(3)]
+    (run.folder / "metrics.jsonl").write_text("\n".join(rows) + "\n" + unfinished)
     row = run.last_metrics
     assert row is not None
-    assert row["frames"] == 39
+    assert row["frames"] == 2
 
 
 def test_the_newest_checkpoint(run: PlannedRun) -> None:
