@@ -136,6 +136,11 @@ class _Starts(BaseModel):
     bootstrap_timeouts: bool = _option(
         False, "bootstrap from the value after a time-out (paper: a time-out is terminal)"
     )
+    returns: Literal["session", "episode"] = _option(
+        "session",
+        "what a return adds up where a scenario has sessions: the session, so that finding out for later pays, or "
+        "the episode alone",
+    )
     bonus_c: float = _coefficient(
         7.0,
         "C of the bonus (default: the paper's for the scenario, else 7 for lang, 3 for cell and 0.1 for lines)",

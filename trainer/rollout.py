@@ -27,7 +27,8 @@ class Rollout(NamedTuple):
     Attributes:
         actions: int64 (T, E, H), as played.
         values, rewards: float32 (T, E); rewards with the bonus.
-        forgets, ended: bool (T, E), whether memory is emptied before this step, and whether the episode ended with it.
+        forgets: bool (T, E), whether memory is emptied before this step.
+        ended: bool (T, E), whether what returns add up ended with it: the episode, or its session.
         bootstrap: float32 (T, E), value of the state a time-out cut an episode off in; 0 elsewhere.
         pair_rows: int64 (T, E), row of the actor's `pairs`; on the CPU.
         log_probs: float32 (T, E, H) of the policy, before masking.
@@ -156,21 +157,22 @@ def _checked(found: Any, shape: tuple[int, ...], sizes: tuple[int, ...]) -> Lead
 def _step(
     session: Session, actions: Tensor, tally: Tally
 ) -> tuple[NDArray[Any], NDArray[np.bool_], NDArray[Any]]:
-    """Step the environments; returns rewards with the bonus, which episodes ended, and their bootstrap, (E,) each."""
+    """Step the environments; returns rewards with the bonus, where returns end, and their bootstrap, (E,) each."""
     envs, state, config = session.envs, session.state, session.config
     played = actions.cpu().numpy()
     observation, reward, terminated, truncated, infos = envs.step(played)
     ended, cut = terminated | truncated, truncated & ~terminated  # (E,)
     success = infos.get("success", np.zeros_like(ended))  # (E,)
-    bootstrap = np.zeros(len(ended), np.float32)
-    if config.bootstrap_timeouts and cut.any():
+    state.trials = (state.trials + ended) % session_of(envs)
+    over = ended & (state.trials == 0) if config.returns == "session" else ended  # (E,)
+    bootstrap, lost = np.zeros(len(ended), np.float32), cut & over
+    if config.bootstrap_timeouts and lost.any():
         final, probe = infos["final_obs"], Actor(session.actor.net, state.tokens.shape[1])
-        image, _ = probe.net.sight.look(final["image"][cut], final["tokens"][cut], state.seen[cut])
-        values = _value(probe, state.memory[probe.move(cut)], image, final["tokens"][cut])
-        bootstrap[cut] = values.cpu().numpy()
+        image, _ = probe.net.sight.look(final["image"][lost], final["tokens"][lost], state.seen[lost])
+        values = _value(probe, state.memory[probe.move(lost)], image, final["tokens"][lost])
+        bootstrap[lost] = values.cpu().numpy()
     state.seen[ended] = 0
     state.tokens, state.starts = observation["tokens"].copy(), ended
-    state.trials = (state.trials + ended) % session_of(envs)
     state.image, state.seen = session.actor.net.sight.look(
         observation["image"].copy(), state.tokens, state.seen
     )
@@ -189,7 +191,7 @@ def _step(
         require_finite("what the bonus paid", torch.from_numpy(paid).float())
         tally.bonus += float(paid.sum()) / config.frames_per_update
         reward = reward + paid
-    return reward.astype(np.float32), ended, bootstrap
+    return reward.astype(np.float32), over, bootstrap
 
 
 def _value(actor: Actor, memory: Tensor, *observation: Any) -> Tensor:

@@ -21,6 +21,9 @@ NOBODY: Final = "nobody"
 CALLER: Final = "caller"
 """Whose actions are those of `step`; said where the caller has several seats and somebody else others."""
 
+# The first words of a row of `State.keys`, which name an episode: seed, index, episode.
+_NAMES: Final = int(Key.EPISODE) + 1
+
 Seating = str | Mapping[str, Any]
 """`agent`, `all`, or the seats that others than the caller fill, by member of the cast."""
 
@@ -29,7 +32,7 @@ class Partner(Protocol):
     """What fills a seat of E games, as `socialai_dsl.episodes.policies.Policy` does."""
 
     def reset(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
-        """Forget the past of games in which a new episode begins, bool (E,)."""
+        """Forget the past of games in which a new episode begins, bool (E,); not those that go on with a session."""
 
     def act(self, observation: Mapping[str, NDArray[Any]]) -> Any:
         """Choose actions, int64 (E, heads), given `image` and `tokens` of E games."""
@@ -170,6 +173,7 @@ class Company:
         self._partners: dict[int, tuple[Any, ...]] = {}
         self._sizes = table.merged.action_space().nvec.astype(np.uint64)
         self._sites = [np.uint64(draws.site(f"seats.{name}")) for name in seats.names]
+        self._begun = np.zeros((table.rows, _NAMES), np.uint64)  # seed, index and episode
         self._sit(dict(seats.partners))
 
     @property
@@ -214,9 +218,18 @@ class Company:
 
     def begin(self, begun: NDArray[np.bool_]) -> None:
         """Episodes have begun in some games, bool (E,)."""
+        names = self._table.state.keys[:, :_NAMES]
+        follows = names - self._begun == np.array([0, 0, 1], np.uint64)
+        goes_on = follows.all(1) & (names[:, Key.EPISODE] % self._table.sessions != 0)
+        self._begun[begun] = names[begun]
         for _, games, player in self._filled():
-            if not isinstance(player, str) and begun[games].any():
-                player.reset(begun[games])
+            if isinstance(player, str):
+                continue
+            forgets, enters = (begun & ~goes_on)[games], (begun & goes_on)[games]
+            if forgets.any():
+                player.reset(forgets)
+            if enters.any() and (enter := getattr(player, "enter", None)) is not None:
+                enter(enters)
 
     def act(self, own: NDArray[Any]) -> NDArray[np.int64]:
         """The actions of all seats, int64 (E S, heads), where the caller's are `own`, game by game."""

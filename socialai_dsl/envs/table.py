@@ -202,6 +202,7 @@ class Table(Copied):
 
     Attributes:
         rows: E. seats: S. players: E S.
+        sessions: uint64 (E,), how many episodes in a row share some of what is drawn.
         image: uint8 (E S, 7, 7, channels), tokens: int16 (E S, L): buffers that every call writes to.
     """
 
@@ -212,6 +213,7 @@ class Table(Copied):
         number = {id(playable): i for i, playable in enumerate(different)}
         numbers = np.array([number[id(playable)] for playable in playables])
         self.pool_of = numbers[np.arange(rows) % len(numbers)]
+        self.sessions = np.array([p.session for p in different], np.uint64)[self.pool_of]
         self._plays_acts = [isinstance(p, ProgramSuite) and p.in_sequence for p in different]
         self.seats = _common_seats(self.programs, self._plays_acts) if all_seats else 1
         self.batch = Batch(

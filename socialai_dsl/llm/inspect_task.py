@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, Final, get_args
 
@@ -52,7 +52,7 @@ def scenario(
     history: int | None = WHOLE,
     on_invalid: OnInvalid = "noop",
     probes: Probing = "apart",
-    trials: int = 1,
+    trials: int | None = None,
     seed: int | None = None,
     tell: Tell | None = None,
     goal: str = "",
@@ -69,7 +69,8 @@ def scenario(
         history: how many observations the model is shown, the present one included; None: the whole episode.
         on_invalid: what a reply without an action does, see `Episode`.
         probes: whether the scenario's probes are asked: `apart` from play, `kept` in later requests, or `off`.
-        trials: how many episodes are one sample and one conversation, in which the model is told how each ended.
+        trials: how many episodes are one sample and one conversation, in which the model is told how each ended; None:
+            those of a session of the scenario.
         seed: of the first episode's room, further ones of those that follow; None: test episodes from 0 on.
         tell: what the model is told of the task: `nothing`, the scenario's `instructions` or the `goal`; None: the goal
             if one is given, else the instructions if there are some.
@@ -82,9 +83,9 @@ def scenario(
         ScenarioError: the scenario does not exist, or has mistakes.
         ValueError: an argument is not what was expected.
     """
-    prompting = PromptOptions(style, mode, on_invalid, history, probes=probes, trials=trials)
+    prompting = PromptOptions(style, mode, on_invalid, history, probes=probes)
     game = _game(scenario, prompting, seats or {}, tell, goal, language)
-    return _task(scenario, [game], prompting, episodes, seed, game.about())
+    return _task(scenario, [game], prompting, episodes, trials, seed, game.about())
 
 
 @task
@@ -96,7 +97,7 @@ def suite(
     history: int | None = WHOLE,
     on_invalid: OnInvalid = "noop",
     probes: Probing = "apart",
-    trials: int = 1,
+    trials: int | None = None,
     seed: int | None = None,
     tell: Tell | None = None,
 ) -> Task:
@@ -110,7 +111,7 @@ def suite(
         history: how many observations the model is shown.
         on_invalid: what a reply without an action does.
         probes: whether they are asked.
-        trials: how many episodes are one sample.
+        trials: how many episodes are one sample; None: those of a session of each scenario.
         seed: of the first episode's room; None: test episodes.
         tell: what the model is told of the task; None: the instructions of those scenarios that have some.
 
@@ -124,10 +125,10 @@ def suite(
     names = [scenarios] if isinstance(scenarios, str) else list(dict.fromkeys(scenarios))
     if not names:
         raise ValueError("scenarios: got none, expected at least one")
-    prompting = PromptOptions(style, mode, on_invalid, history, probes=probes, trials=trials)
+    prompting = PromptOptions(style, mode, on_invalid, history, probes=probes)
     games = [_game(name, prompting, {}, tell) for name in names]
     about = {"text": TextView.version, "scenarios": {game.scenario: game.about() for game in games}}
-    return _task("suite", games, prompting, episodes, seed, about)
+    return _task("suite", games, prompting, episodes, trials, seed, about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +140,11 @@ class _Game:
     briefing: Briefing
     prompting: PromptOptions
     seats: Mapping[str, str]
+
+    @property
+    def session(self) -> int:
+        """How many episodes of it in a row share some of what is drawn."""
+        return self.played.program.session
 
     def episode(self) -> Episode:
         """An environment of its own."""
@@ -222,16 +228,14 @@ def _task(
     games: Sequence[_Game],
     prompting: PromptOptions,
     episodes: int,
+    trials: int | None,
     seed: int | None,
     about: dict[str, Any],
 ) -> Task:
     """The task that plays these games."""
-    trials = prompting.trials
     for option, given, least in (("episodes", episodes, 1), ("trials", trials, 1), ("seed", seed, 0)):
         if given is not None and given < least:
             raise ValueError(f"{option}: got {given}, expected at least {least}")
-    if episodes % trials:
-        raise ValueError(f"episodes: got {episodes}, expected a multiple of the {trials} trials")
     if seed is None and episodes > TEST_SET:
         raise ValueError(f"episodes: got {episodes}, expected at most the {TEST_SET} of the test set")
     if prompting.probes not in get_args(Probing):
@@ -241,11 +245,17 @@ def _task(
     probes = list(dict.fromkeys(probe for game in games for probe in game.probes()))
     samples = []
     for game in games:
-        endings = game.endings()
+        endings, in_a_row = game.endings(), trials or game.session
+        if episodes % in_a_row:
+            raise ValueError(f"episodes: got {episodes}, expected a multiple of the {in_a_row} trials")
+        if seed is not None and game.session > 1:
+            raise ValueError(
+                f"seed: got {seed}, but {game.scenario} has sessions, which the test set alone has"
+            )
         with closing(game.episode()) as episode:
-            for number in range(0, episodes, trials):
+            for number in range(0, episodes, in_a_row):
                 called = number if len(games) == 1 else f"{game.scenario} {number}"
-                of_sample = rooms[number : number + trials]
+                of_sample = rooms[number : number + in_a_row]
                 samples.append(game.sample(episode, called, of_sample, endings, probes))
     by_name = {game.scenario: game for game in games}
     return Task(
@@ -268,8 +278,9 @@ def player(episode: Callable[[str], Episode], prompting: PromptOptions) -> Solve
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         with closing(episode(state.metadata["scenario"])) as playing:
-            session = Session(state, playing, prompting)
-            for trial, room in enumerate(state.metadata["rooms"]):
+            rooms = state.metadata["rooms"]
+            session = Session(state, playing, replace(prompting, trials=len(rooms)))
+            for trial, room in enumerate(rooms):
                 await session.play(trial, room)
         return state
 

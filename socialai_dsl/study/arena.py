@@ -69,7 +69,8 @@ class Arena:
         """See that so many environments wait to be played in, and that a first step takes no longer than others."""
         made = [self.take() for _ in range(count - len(self._free))]
         for env in made[:1]:
-            episode = Episode(self, {}, {"seed": 0}, env)
+            episode = Episode(self, {}, env)
+            episode.begin({"seed": 0})
             episode.step(dict.fromkeys(self.seats, self.standing))
             episode.picture(AGENT)
         self._free += made
@@ -175,15 +176,13 @@ class Ending:
 
 @dataclass
 class Episode:
-    """An episode that goes on.
+    """An episode that goes on; after it the next one of its session may begin, which the same players remember.
 
     Args:
         arena: where it is played.
         players: of each seat that a trained agent may have, or take over, what makes a policy, see `Policy`; it is
             asked for when the agent first acts, and then shown all that the seat has seen.
-        reset: arguments of `env.reset`.
         env: what it is played in. observers: are told of all that happens.
-        about: what chance follows from besides the seat and the step.
 
     Attributes:
         t: steps so far. ending: None while it goes on. heard: of each seat, pairs of a step and a line.
@@ -192,10 +191,8 @@ class Episode:
 
     arena: Arena
     players: Mapping[Seat, Callable[[], Any]]
-    reset: Mapping[str, Any]
     env: Any
     observers: Sequence[Observer] = ()
-    about: str = ""
     t: int = 0
     ending: Ending | None = None
     heard: dict[Seat, list[tuple[int, str]]] = field(default_factory=dict)
@@ -203,13 +200,28 @@ class Episode:
 
     def __post_init__(self) -> None:
         self.rooms = Rooms(self.env, self.observers)
+        self._about, self._first = "", ""
+        self._unseen: dict[Seat, list[Observation | None]] = {seat: [] for seat in self.players}
+
+    def begin(self, reset: Mapping[str, Any], about: str = "") -> None:
+        """Begin the episode, or after its end the next one of its session.
+
+        Args:
+            reset: arguments of `env.reset`.
+            about: what chance follows from besides the seat and the step.
+        """
+        if self.ending is None:
+            self._first = about
+        else:
+            for unseen in self._unseen.values():
+                unseen.append(None)  # another room
+        self._about, self.t, self.ending = about, 0, None
         if len(self.rooms.names) > 1:
             self.rooms.leave_to_scripts(())
-        self.rooms.begin(self.reset)
+        self.rooms.begin(reset)
         self._returns = dict.fromkeys(self.rooms.names, 0.0)
         self._last: dict[Seat, LastStep] = {}
         self._own: dict[Seat, Action] = {}
-        self._unseen: dict[Seat, list[Observation]] = {seat: [] for seat in self.players}
         self.heard = {seat: [] for seat in self.arena.seats}
         self._look()
 
@@ -220,12 +232,16 @@ class Episode:
             unseen.append({name: value.copy() for name, value in self.rooms.seen[seat].items()})
 
     def _of_policy(self, seat: Seat) -> Action:
-        """What a trained agent does in the next step, which remembers the whole episode whoever acted before."""
+        """What a trained agent does in the next step, which remembers the whole session whoever acted before."""
+        everywhere = np.ones(1, np.bool_)
         if seat not in self.acting:
             policy = self.acting[seat] = self.players[seat]()
-            policy.reset(np.ones(1, np.bool_), np.array([_number(f"{self.about} {seat}")]))
+            policy.reset(everywhere, np.array([_number(f"{self._first} {seat}")]))
         for seen in self._unseen[seat]:
-            self._own[seat] = np.asarray(self.acting[seat].act(seen))[0].tolist()
+            if seen is not None:
+                self._own[seat] = np.asarray(self.acting[seat].act(seen))[0].tolist()
+            elif (enter := getattr(self.acting[seat], "enter", None)) is not None:
+                enter(everywhere)
         self._unseen[seat].clear()
         return self._own[seat]
 
@@ -242,7 +258,7 @@ class Episode:
             found: Action = self.env.scripted_actions(AGENT)[0].tolist()
             return found
         if who == RANDOM:
-            drawn = hashlib.sha256(f"{self.about} {self.t} {seat}".encode()).digest()
+            drawn = hashlib.sha256(f"{self._about} {self.t} {seat}".encode()).digest()
             sizes = self.rooms.action_sizes
             return [int.from_bytes(drawn[4 * n : 4 * n + 4], "big") % size for n, size in enumerate(sizes)]
         return self._of_policy(seat) if is_trained(who) else self.arena.standing

@@ -21,7 +21,7 @@ from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.journal import Journal
 from socialai_dsl.study.messages import Act
 from socialai_dsl.study.players import Players
-from socialai_dsl.study.progress import Game, Participant, Progress
+from socialai_dsl.study.progress import Game, Participant, Played, Progress
 from socialai_dsl.study.replay import reset_of
 
 if TYPE_CHECKING:  # it needs httpx, which is only there if language models were asked for
@@ -121,35 +121,40 @@ class Games:
 
     def _next_episode(self, game: Game) -> None:
         number = len(game.results)
-        self._drop(game)
         self._journal.do("episode", game=game.id, number=number, room=self._progress.rooms(game)[number])
-        self.of(game)
+        running = self._running.get(game.id)
+        if not game.before or running is None:
+            self._drop(game)
+            self.of(game)
+        elif game.episode is not None:  # the same players go on
+            running = self._running[game.id] = Running(running.episode, thinking=running.thinking)
+            self._play_again(game, running, game.episode)
 
     def of(self, game: Game) -> Running:
         """A game as it is played now; after a new start it is played again as far as it was."""
-        found = self._running.get(game.id)
+        found, now = self._running.get(game.id), game.episode
+        assert now is not None, "internal: a game begins with an episode"
         if found is None:
-            arena, played = self._arenas[game.block], game.episode
-            assert played is not None, "internal: a game begins with an episode"
-            env = arena.take()
+            arena, env = self._arenas[game.block], self._arenas[game.block].take()
             thinking = self._players.thinking(game.block)
             watching = () if thinking is None else tuple(thinking.seats.values())
-            episode = Episode(
-                arena,
-                self._players.agents(game.block, env),
-                reset_of(game.block, played.room),
-                env,
-                watching,
-                f"{game.id} {played.number}",
-            )
-            for step in played.steps:
-                if thinking is not None:
-                    thinking.again(step.get("replies", {}), step.get("missed", {}))
-                episode.step(step["acts"])
+            episode = Episode(arena, self._players.agents(game.block, env), env, watching)
             found = self._running[game.id] = Running(episode, thinking=thinking)
-            if episode.ending is not None and played.ended is None:  # the server died in between
+            for played in (*game.before, now):
+                self._play_again(game, found, played)
+            if episode.ending is not None and now.ended is None:  # the server died in between
                 self._end(game, found)
         return found
+
+    def _play_again(self, game: Game, running: Running, played: Played) -> None:
+        """Begin an episode of a game, and play it as far as it was."""
+        running.episode.begin(reset_of(game.block, played.room), f"{game.id} {played.number}")
+        if running.thinking is not None:
+            running.thinking.begin()
+        for step in played.steps:
+            if running.thinking is not None:
+                running.thinking.again(step.get("replies", {}), step.get("missed", {}))
+            running.episode.step(step["acts"])
 
     def _drop(self, game: Game) -> None:
         """Give back what a game was played in."""

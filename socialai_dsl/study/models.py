@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import httpx
@@ -92,15 +92,16 @@ class Endpoints:
 
 
 class ModelSeat(Observer):
-    """A seat that a model has, or may take over in the middle of an episode: then it is shown all that came before.
+    """A seat that a model has in a session, or may take over: then it is shown all that came before.
 
     Args:
         arena: what is played. seat: which one. who: `llm:MODEL`. endpoints: where it is asked.
+        session: how many episodes it remembers at most.
     """
 
-    def __init__(self, arena: Arena, seat: Seat, who: str, endpoints: Endpoints) -> None:
+    def __init__(self, arena: Arena, seat: Seat, who: str, endpoints: Endpoints, session: int) -> None:
         self._arena, self._seat, self._who, self._endpoints = arena, seat, who, endpoints
-        self._prompting = endpoints.prompting
+        self._prompting = replace(endpoints.prompting, trials=session)
         self._text = TextSeat(
             arena.program,
             **self._prompting.of_episodes,
@@ -110,12 +111,19 @@ class ModelSeat(Observer):
         )
         self._rooms: Rooms
         self._conversation: Conversation
+        self._before: Conversation | None = None
+        self._trial = 0
         self._decision: Decision | None = None
 
     def began(self, rooms: Rooms, begun: NDArray[np.bool_]) -> None:
         """See `Observer.began`."""
         self._rooms, self._decision = rooms, None
-        self._conversation = Conversation(self._text, self._prompting, 0, None, self._text.begin(rooms))
+        begins = self._text.begin(rooms)
+        self._conversation = Conversation(
+            self._text, self._prompting, self._trial, None, begins, self._before
+        )
+        self._before = self._conversation
+        self._trial += 1
 
     async def act(self) -> tuple[list[Record], Action]:
         """What the model answers, and what it does in the next step.
@@ -182,6 +190,11 @@ class Thinking:
         self.out: dict[Seat, str] = {}
         self._asked: dict[Seat, float] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+
+    def begin(self) -> None:
+        """Take it that an episode begins: those who were out may play again."""
+        self.stop()
+        self.out.clear()
 
     def again(self, replies: Mapping[Seat, Sequence[Record]], missed: Mapping[Seat, str]) -> None:
         """Take it that models gave these answers before a step that is played again, and that these were out."""

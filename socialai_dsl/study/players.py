@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from socialai_dsl.checking.loaded import session_of
 from socialai_dsl.checking.studies import (
     PRACTICE,
     LoadedStudy,
@@ -85,8 +86,12 @@ class Players:
             return None
         from socialai_dsl.study.models import ModelSeat, Thinking
 
-        arena, endpoints = self._arenas[block], self._endpoints
-        seats = {seat: ModelSeat(arena, seat, who, endpoints) for seat, who in models.items()}
+        arena, endpoints, session = (
+            self._arenas[block],
+            self._endpoints,
+            session_of(self._loaded.played[block]),
+        )
+        seats = {seat: ModelSeat(arena, seat, who, endpoints, session) for seat, who in models.items()}
         return Thinking(seats, self._study.blocks[block].act_within)
 
     @property
@@ -100,7 +105,7 @@ class Players:
             self._endpoints.spent_before(spent)
 
     def give(self, block: int, episode: Episode) -> None:
-        """Take back the agents that have played in an episode of a block."""
+        """Take back the agents that have played in a session of a block."""
         for seat, policy in episode.acting.items():
             self._policies[block, seat].append(policy)
 

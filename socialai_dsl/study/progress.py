@@ -6,6 +6,7 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from socialai_dsl.checking.loaded import session_of
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, persons_of, seats_of, stand_ins_of
 from socialai_dsl.schema.study import Question
 from socialai_dsl.semantics.study import least_filled, shuffled
@@ -43,7 +44,8 @@ class Game:
         id: of the game. block: its number, or `PRACTICE`.
         seats: of each seat who has it: a participant's id, or a word that is no participant's.
         gone: participants who have left, whose seats somebody else plays.
-        episode: the present one. results: the successes of each seat in the episodes that have ended.
+        episode: the present one. before: those before it in its session, which agents and models remember as well.
+        results: the successes of each seat in the episodes that have ended.
     """
 
     id: str
@@ -51,6 +53,7 @@ class Game:
     seats: dict[str, str]
     gone: set[str] = field(default_factory=set)
     episode: Played | None = None
+    before: list[Played] = field(default_factory=list)
     results: list[Mapping[str, bool]] = field(default_factory=list)
 
 
@@ -157,6 +160,10 @@ class Progress:
         assert self.study.practice is not None, "internal: there is practice"
         return self.study.practice.episodes
 
+    def session(self, game: Game) -> int:
+        """How many episodes of a game in a row are a session."""
+        return 1 if game.block == PRACTICE else session_of(self.loaded.played[game.block])
+
     def full(self, dropped: Container[str]) -> bool:
         """Whether as many take part as may, without those who dropped out."""
         most = self.study.participants
@@ -256,7 +263,7 @@ class Progress:
         if game.episode is not None and all(
             p.game != game.id for p in map(self.people.get, game.seats.values()) if p
         ):
-            game.episode.steps = []
+            game.episode.steps, game.before = [], []
         if self.stage(person) == ("play", PRACTICE):
             person.rounds += 1
             person.practised = event["passed"]
@@ -273,7 +280,11 @@ class Progress:
                     if who in self.people:
                         self.people[who].game = game.id
             case "episode":
-                self.games[event["game"]].episode = Played(event["number"], event["room"])
+                game = self.games[event["game"]]
+                begun = Played(event["number"], event["room"])
+                goes_on = begun.number % self.session(game) != 0
+                game.before = [*game.before, *filter(None, [game.episode])] if goes_on else []
+                game.episode = begun
             case "step":
                 episode = self.games[event["game"]].episode
                 assert episode is not None, "internal: a step is one of an episode"

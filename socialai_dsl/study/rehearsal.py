@@ -40,6 +40,7 @@ from socialai_dsl.schema.study import PERSON
 from socialai_dsl.study.arena import Action, Arena, Episode
 from socialai_dsl.study.messages import Screen
 from socialai_dsl.study.players import agent_of, require_models
+from socialai_dsl.study.progress import Game, Played, Progress
 from socialai_dsl.study.replay import StudyData, reset_of, study_data
 from socialai_dsl.study.server import StudyServer
 from socialai_dsl.study.serving import config_of
@@ -300,6 +301,19 @@ def _fitting(agent: str, loaded: LoadedStudy) -> tuple[dict[int, Arena], str]:
     return found, why
 
 
+@dataclass
+class _Mirror:
+    """A session of a game that is played beside the server's.
+
+    Attributes:
+        session: the game, and the number of its first episode. episode: that goes on. begun: how many have begun.
+    """
+
+    session: tuple[str, int]
+    episode: Episode
+    begun: int = 0
+
+
 class Simulated:
     """A simulated participant."""
 
@@ -316,7 +330,7 @@ class Simulated:
     ) -> None:
         self._server, self._at, self._code, self._kind = server, at, code, kind
         self._pace, self._speed, self._rng, self._mind = pace, speed, rng, mind
-        self._mirror: tuple[str, Episode] | None = None
+        self._mirror: _Mirror | None = None
         self._model: ModelSeat | None = None
         self._course = Course(kind)
         self._game: Screen = {}
@@ -436,29 +450,41 @@ class Simulated:
         seat = progress.seat_of(game, person.id)
         if not self._mind.plays(game.block, seat):
             return None
-        arena, name = self._mind.arenas[game.block], f"{game.id} {game.episode.number}"
-        if self._mirror is None or self._mirror[0] != name:
-            self._mirror = name, self._beginning(arena, seat, name, reset_of(game.block, game.episode.room))
-        episode = self._mirror[1]
-        for step in game.episode.steps[episode.t :]:
-            if self._model is not None and step["by"][seat] != PERSON:
-                self._model.passed()
-            episode.step(step["acts"])
+        episode = self._mirrored(progress, game, game.episode, seat)
         if episode.ending is not None:
             return None
         action = await self._chosen(episode, seat)
-        return None if action is None else arena.words(action)
+        return None if action is None else episode.arena.words(action)
 
-    def _beginning(self, arena: Arena, seat: Seat, name: str, reset: dict[str, Any]) -> Episode:
-        """A room like the server's in which its mind looks from the seat."""
+    def _mirrored(self, progress: Progress, game: Game, now: Played, seat: Seat) -> Episode:
+        """The episode of a game as far as it is played, with all its session, where its mind looks from the seat."""
+        session = game.id, now.number - len(game.before)
+        if self._mirror is None or self._mirror.session != session:
+            arena = self._mind.arenas[game.block]
+            self._mirror = _Mirror(session, self._beginning(arena, seat, progress.session(game)))
+        mirror, episode = self._mirror, self._mirror.episode
+        for number, played in enumerate((*game.before, now)):
+            if number == mirror.begun:
+                episode.begin(reset_of(game.block, played.room), f"{game.id} {played.number}")
+                mirror.begun += 1
+            if number < mirror.begun - 1:
+                continue
+            for step in played.steps[episode.t :]:
+                if self._model is not None and step["by"][seat] != PERSON:
+                    self._model.passed()
+                episode.step(step["acts"])
+        return episode
+
+    def _beginning(self, arena: Arena, seat: Seat, session: int) -> Episode:
+        """An episode that is to begin, with its mind on the seat."""
         env, who = arena.take(), self._mind.who
         agents = {seat: lambda: agent_of(who, Path(), env)} if is_trained(who) else {}
         if self._mind.endpoints is not None:
             from socialai_dsl.study.models import ModelSeat
 
-            self._model = ModelSeat(arena, seat, who, self._mind.endpoints)
+            self._model = ModelSeat(arena, seat, who, self._mind.endpoints, session)
         watching = () if self._model is None else (self._model,)
-        return Episode(arena, agents, reset, env, watching, name)
+        return Episode(arena, agents, env, watching)
 
     async def _chosen(self, episode: Episode, seat: Seat) -> Action | None:
         if self._model is None:

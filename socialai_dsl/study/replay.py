@@ -202,7 +202,8 @@ class _Tables:
                     )
                 env, asking = arena.take(), Asking(self._loaded.played[game.block], arena.program)
                 fired = dict(env.counters()["rules"])
-                episode = Episode(arena, {}, reset_of(game.block, event["room"]), env, [asking])
+                episode = Episode(arena, {}, env, [asking])
+                episode.begin(reset_of(game.block, event["room"]))
                 self._going[game.id] = _Going(episode, event["time"], asking, fired)
             case "step":
                 self._step(progress.games[event["game"]], event)

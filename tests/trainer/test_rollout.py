@@ -47,16 +47,23 @@ def play(config: Any, envs: EchoEnvs, rollouts: int = 1) -> tuple[Session, Rollo
 
 
 @pytest.mark.parametrize("episodes", [1, 2, 3])
-def test_an_agent_forgets_where_a_session_begins(episodes: int, small_config: Any) -> None:
+@pytest.mark.parametrize("returns", ["session", "episode"])
+def test_an_agent_forgets_where_a_session_begins(episodes: int, returns: str, small_config: Any) -> None:
     envs = EchoEnvs(8, limit=2)
     envs.program.session = episodes
-    session = Session.start(small_config(), envs)
+    session = Session.start(small_config(returns=returns, bootstrap_timeouts=True), envs)
+    session.bonus = told = Remembers()  # type: ignore[assignment]
     rollouts = [collect(session) for _ in range(3)]
-    forgets, ended = (torch.cat([getattr(one, name) for one in rollouts]) for name in ("forgets", "ended"))
+    forgets, over = (torch.cat([getattr(one, name) for one in rollouts]) for name in ("forgets", "ended"))
+    ended = torch.from_numpy(np.stack([step.ended for step in told.steps]))
     assert ended.sum() > 8 * episodes
     before = torch.cat((torch.zeros(1, 8), ended.cumsum(0)[:-1]))  # episodes that have ended
     begins = torch.cat((torch.ones(1, 8, dtype=torch.bool), ended[:-1]))
     assert torch.equal(forgets, begins & (before % episodes == 0))
+    assert torch.equal(over, ended & (ended.cumsum(0) % episodes == 0) if returns == "session" else ended)
+    bootstrap = torch.cat([one.bootstrap for one in rollouts])
+    assert (bootstrap[~over] == 0).all(), "the next episode's value stands for what is to come there"
+    assert (bootstrap[over] != 0).any()
     for rollout in rollouts:  # what is remembered is not empty, but where a session begins
         assert torch.equal(rollout.memories[0].flatten(1).abs().sum(1) == 0, rollout.forgets[0])
 

@@ -121,6 +121,71 @@ def test_a_policy_fills_a_seat(two: str) -> None:
     assert policy.begun == 6
 
 
+class Noting(Greeter):
+    """Notes in which games it forgets, and in which it enters a room without forgetting."""
+
+    def __init__(self, action: NDArray[np.int64]) -> None:
+        super().__init__(action)
+        self.notes: list[tuple[str, list[bool]]] = []
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Any = None) -> None:
+        self.notes.append(("forgets", mask.tolist()))
+
+    def enter(self, mask: NDArray[np.bool_]) -> None:
+        self.notes.append(("enters", mask.tolist()))
+
+
+@pytest.fixture
+def in_sessions(tmp_path: Path) -> tuple[str, Noting]:
+    text = TWO + 'let: {word: pick("hello" | "bye")}\nsession: {episodes: 3, same: word}\n'
+    file = str(Folder(tmp_path).write("sessions", text))
+    return file, Noting(sd.make(file).unwrapped.encode_action((None, "Say hello")))
+
+
+def test_a_policy_on_a_seat_remembers_a_session(in_sessions: tuple[str, Noting]) -> None:
+    file, policy = in_sessions
+    env = sd.make(file, seats={"bob": policy})
+    for reset in (
+        {"seed": 4},  # a session begins
+        {},  # and goes on
+        {},
+        {},  # the next one
+        {},
+        {"options": {"test_episode": 4}},  # the middle of another
+        {"options": {"test_episode": 5}},  # which goes on
+        {"options": {"test_episode": 5}},  # the same room again
+        {"options": {"test_episode": 6}},
+        {"seed": 4},
+    ):
+        env.reset(**reset)  # type: ignore[arg-type]
+    told = [word for word, _ in policy.notes]
+    assert told == [
+        "forgets",
+        "enters",
+        "enters",
+        "forgets",
+        "enters",
+        *["forgets", "enters"],
+        *["forgets"] * 3,
+    ]
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_a_policy_in_many_games_remembers_the_session_of_each(
+    in_sessions: tuple[str, Noting], mode: str
+) -> None:
+    file, policy = in_sessions
+    envs = sd.make_vec(file, 2, seats={"bob": policy}, autoreset_mode=mode)
+    envs.reset(seed=0)
+    still, leaving = actions(envs, (None, None), (None, "Say bye"))
+    for step in range(40):  # the second game ends at once now and then
+        envs.step(np.stack([still, leaving if step % 5 == 0 else still]))
+    for game in range(2):
+        told = [word for word, mask in policy.notes if mask[game]]
+        assert len(told) > 5
+        assert told == (["forgets", "enters", "enters"] * len(told))[: len(told)]
+
+
 def test_nobody_on_a_seat_stays_and_is_silent(two: str) -> None:
     env = sd.make(two, seats={"bob": "nobody"}).unwrapped
     env.reset(seed=1)

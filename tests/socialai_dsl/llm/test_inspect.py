@@ -1,6 +1,7 @@
 """Scenarios as tasks of Inspect AI, offline: a model that knows the script scores what the script scores."""
 
 import gc
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from inspect_ai.log import bundle_log_dir
 from inspect_ai.model import ChatMessageAssistant, GenerateConfig, ModelOutput, ModelUsage, get_model
 from inspect_ai.tool import ToolCall
 
+from socialai_dsl.llm import inspect_task
 from socialai_dsl.llm.inspect_task import outcome
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries
@@ -296,6 +298,18 @@ def test_a_sample_of_several_trials_is_one_conversation() -> None:
     assert "The episode is over" in second.split("Episode 2 of 2 begins")[0]
     assert len(told) == 1 + 2 * 2 * 20 + 1
     assert {name for name in metrics(log) if name.startswith("trial")} == {"trial 1", "trial 2"}
+
+
+def test_a_sample_is_a_session_of_the_scenario_unless_asked_otherwise() -> None:
+    sessions = str(Path(__file__).parents[2] / "data" / "agreement" / "sessions.yaml")
+    log = run(lambda messages: "Act: done", "suite", scenarios=["help", sessions], episodes=6)
+    assert log.status == "success", log.error
+    assert Counter(len(sample.metadata["rooms"]) for sample in log.samples) == {1: 6, 3: 2}
+    assert len(run(lambda messages: "Act: done", scenario=sessions, episodes=2, trials=1).samples) == 2
+    with pytest.raises(ValueError, match="sessions, which the test set alone has"):
+        inspect_task.scenario(sessions, episodes=3, seed=1)
+    with pytest.raises(ValueError, match="expected a multiple of the 3 trials"):
+        inspect_task.scenario(sessions, episodes=4)
 
 
 def test_rooms_of_a_seed_are_others_than_those_of_the_test_set() -> None:

@@ -59,7 +59,8 @@ def test_an_agent_acts_in_a_rehearsal_as_it_acts_elsewhere(
             env = arena.take()
             agents = {} if "rival" in kind else {s: partial(agent_of, kind, Path(), env) for s in arena.seats}
             reset = reset_of(progress.games["g1"].block, event["room"])
-            episode = Episode(arena, agents, reset, env, about=f"g1 {event['number']}")
+            episode = Episode(arena, agents, env)
+            episode.begin(reset, f"g1 {event['number']}")
         if event["event"] == "step" and event["game"] == "g1":
             assert episode is not None
             for seat, by in event["by"].items():

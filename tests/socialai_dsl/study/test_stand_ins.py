@@ -8,6 +8,7 @@ import shlex
 import shutil
 from collections import Counter
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -169,7 +170,9 @@ def test_an_agent_that_takes_over_remembers_what_came_before(scenario: str, who:
     def episode() -> Episode:
         env = arena.take()
         made = {"agent": lambda: agent_of(who, Path(), env)}
-        return Episode(arena, made, {"seed": 3}, env, about="g1 0")
+        begun = Episode(arena, made, env)
+        begun.begin({"seed": 3}, "g1 0")
+        return begun
 
     watches, comes = episode(), episode()
     chosen = []
@@ -187,6 +190,32 @@ def test_an_agent_that_takes_over_remembers_what_came_before(scenario: str, who:
     late.act(comes.rooms.seen["agent"])
     assert not np.allclose(late.state()["memory"], memory), "one that has only seen the end knows less"
     assert len({tuple(one or ()) for one in chosen}) > 1
+
+
+def test_an_agent_that_takes_over_remembers_its_session() -> None:
+    """It knows of the episode before what one knows that was there, and its random numbers go on."""
+    pytest.importorskip("torch", reason="a trained agent needs PyTorch")
+    from socialai_dsl.frontend import load
+
+    arena, who = Arena(load("help")), "shipped:help"
+    watches, comes, forgets = (
+        Episode(arena, {"agent": partial(agent_of, who, Path(), env)}, env)
+        for env in (arena.take(), arena.take(), arena.take())
+    )
+    for number in range(2):
+        for one in (watches, comes):
+            one.begin({"options": {"test_episode": [number]}}, f"g1 {number}")
+        while number == 0 and watches.ending is None:
+            acts = {"agent": watches.chosen("agent", who)}
+            for one in (watches, comes):
+                one.step(acts)
+    assert (comes.t, comes.heard, comes.acting) == (0, {seat: [] for seat in arena.seats}, {})
+    forgets.begin({"options": {"test_episode": [1]}}, "g1 1")
+    chosen = [one.chosen("agent", who) for one in (watches, comes, forgets)]
+    memories = [one.acting["agent"].state()["memory"] for one in (watches, comes, forgets)]
+    assert chosen[0] == chosen[1]
+    assert (memories[0] == memories[1]).all()
+    assert not np.allclose(memories[1], memories[2])
 
 
 def test_a_rival_has_the_agents_seat_from_the_start(place: Path, tmp_path: Path) -> None:
@@ -367,6 +396,62 @@ def test_a_server_that_is_started_again_goes_on_with_the_models_conversation(tmp
 
         run(play)
     assert stub.requests[3]["messages"] == stub.requests[2]["messages"]
+
+
+IN_SESSIONS = """\
+scenario: sessions
+horizon: 3
+grammar: {templates: [Say <noun>], nouns: [hello, bye]}
+room: {size: 7}
+let: {word: pick("hello" | "bye")}
+session: {episodes: 2, same: word}
+cast:
+  agent: {at: [1, 1]}
+  bob: {at: [3, 1], seat: open}
+outcome:
+  - {success: agent.said("Say bye")}
+"""
+
+
+def test_a_model_remembers_its_session_also_when_the_server_is_started_again(tmp_path: Path) -> None:
+    pytest.importorskip("httpx", reason="language models need the extra llm")
+    (tmp_path / "sessions.yaml").write_text(IN_SESSIONS, encoding="utf-8")
+    text = BESIDE.replace("together/help_together, episodes: 2", "sessions.yaml, episodes: 4")
+
+    def has_gone_on(one: Taking, t: int) -> bool:
+        return one.now["t"] > t or bool(one.now.get("ended"))
+
+    async def play(folder: Path, again: bool) -> None:
+        live = Live(loaded, folder)
+        one = await newcomer(live)
+        await one.go()
+        while one.now["do"] == "play":
+            before = one.now["t"]
+            if one.now.get("ended"):
+                await one.go()
+                continue
+            await one.act("left")
+            await until_true(partial(has_gone_on, one, before))
+            if again:
+                await live.close()
+                live = Live(loaded, folder)
+                one = await Taking(live, one.person).come()
+        await live.close()
+
+    asked: list[list[Any]] = []
+    for again in (False, True):
+        with endpoint(lambda request: "Act: right") as stub:
+            loaded = loaded_study(model(text.replace("jill", "bob"), stub), tmp_path)
+            folder = tmp_path / str(again)
+            folder.mkdir()
+            run(partial(play, folder, again))
+        asked.append([messages for messages, _ in groupby(request["messages"] for request in stub.requests)])
+    assert asked[0] == asked[1]
+    replies = [sum(one["role"] == "assistant" for one in messages) for messages in asked[0]]
+    assert replies == [0, 1, 2, 3, 4, 5] * 2, "an episode has three steps, a session two episodes"
+    told = [messages[-1]["content"] for messages in asked[0]]
+    assert all(told[number].startswith("Episode 1 of 2 begins") for number in (0, 6))
+    assert all("Episode 2 of 2 begins" in told[number] for number in (3, 9))
 
 
 def test_a_person_who_is_late_is_stood_in_for_by_a_model_which_gets_its_own_time(tmp_path: Path) -> None:

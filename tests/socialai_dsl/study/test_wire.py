@@ -59,7 +59,8 @@ def moments(name: str, pinned: bool = False) -> tuple[dict[Any, set[str]], int]:
         reset = (
             {"seed": room, "options": {"layout": layout}} if pinned else {"options": {"test_episode": [room]}}
         )
-        episode = Episode(arena, {}, reset, env)
+        episode = Episode(arena, {}, env)
+        episode.begin(reset)
         known: dict[str, tuple[Any, ...]] = dict.fromkeys(arena.seats, ())
         for move in [None, *acts]:
             if move is not None:
