@@ -43,7 +43,7 @@ test-long: $(STAMP) ## run the tests that take minutes
 test-package: $(STAMP) ## build the wheel, and try it and its extras one by one in empty environments; installs them from an index
 	$(BIN)/python -m pytest -m "not learning" tests/test_package.py $(ARGS)
 
-test-learning: $(STAMP) ## train agents on two scenarios for minutes, and require what they have to reach
+test-learning: $(STAMP) ## train agents on four scenarios for minutes, and require what they have to reach
 	$(BIN)/python -m pytest -m learning tests/test_learning.py $(ARGS)
 
 # These libraries want other versions of what the lock names, so they have a virtual environment of their own.

@@ -49,3 +49,19 @@ def test_an_agent_learns_within_a_session(tmp_path: Path, capsys: pytest.Capture
     assert first < 0.7
     assert len(later) == 4
     assert min(later) >= 0.95
+
+
+@pytest.mark.learning
+@pytest.mark.timeout(3600)
+def test_an_agent_pays_for_finding_out_what_later_episodes_need(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It asks in the first episode, which pays less there, and then does what is best; the box alone gives 0.6."""
+    stranger = str(Path(__file__).parents[1] / "experiments" / "sessions" / "stranger.yaml")
+    options = ["--recipe", "plain", "--frames", "1000000", "--seed", "0", "--threads", "1", "--device", "cpu"]
+    assert main.main(["run", stranger, *options, "--out", str(tmp_path), "--json"]) == 0
+    capsys.readouterr()
+    figures = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["eval"]
+    _, *later = [trial["success_rate"] for trial in figures["trials"]]
+    assert min(later) >= 0.95
+    assert figures["mean_return"] >= 0.75

@@ -222,11 +222,15 @@ WRONG = {
 WRITTEN = [*SHIPPED_SAMPLES, *sorted(str(path) for path in SAMPLES.glob("*.yaml"))]
 
 
+@pytest.fixture(scope="module")
+def programs() -> dict[str, Program]:
+    return {name: compile_scenario(load(name).checked) for name in WRITTEN}
+
+
 @pytest.mark.parametrize("bug", one_in(10, WRONG, "plays on the slow interpreter"))
-def test_a_wrong_instruction_is_found_out(bug: str) -> None:
+def test_a_wrong_instruction_is_found_out(bug: str, programs: dict[str, Program]) -> None:
     """By a comparison, or already by the verifier."""
     op, write = WRONG[bug]
-    programs = {name: compile_scenario(load(name).checked) for name in WRITTEN}
     often = {name: int(np.count_nonzero(program.code[:, 0] == op)) for name, program in programs.items()}
     written = sorted((name for name in often if often[name]), key=lambda name: -often[name])
     assert written, f"no sample has {op.name}"
