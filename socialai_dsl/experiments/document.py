@@ -28,6 +28,8 @@ _WITHOUT_EFFECT: Final = ("key_from", "concurrency", "timeout", "budget", "price
 """Options of language models on which no reply depends."""
 
 _ID_LENGTH: Final = 12
+# Options that earlier versions did not have: where they are as usual, runs of those versions keep their names.
+_CAME_LATER: Final = ("returns",)
 
 
 def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]:
@@ -99,6 +101,8 @@ def run_id(cell: Cell, seed: int, program: str, agent: str, code: Mapping[str, s
     options = config_of(cell, seed).model_dump(
         exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"})}
     )
+    usual = {name: RunConfig.model_fields[name].default for name in _CAME_LATER}
+    options = {name: value for name, value in options.items() if name not in usual or value != usual[name]}
     decisive = options | {"program": program, "agent": agent} | ({"code": dict(code)} if code else {})
     decisive |= {"trials": cell.trials} if cell.trials > 1 else {}
     asked = {name: value for name, value in cell.model.items() if name not in _WITHOUT_EFFECT}

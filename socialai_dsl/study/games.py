@@ -123,12 +123,13 @@ class Games:
         number = len(game.results)
         self._journal.do("episode", game=game.id, number=number, room=self._progress.rooms(game)[number])
         running = self._running.get(game.id)
-        if not game.before or running is None:
+        if running is None or not game.before:
             self._drop(game)
             self.of(game)
-        elif game.episode is not None:  # the same players go on
-            running = self._running[game.id] = Running(running.episode, thinking=running.thinking)
-            self._play_again(game, running, game.episode)
+            return
+        assert game.episode is not None, "internal: it has just begun"
+        self._running[game.id] = Running(running.episode, thinking=running.thinking)  # the same players go on
+        self._play_again(game, running, game.episode)
 
     def of(self, game: Game) -> Running:
         """A game as it is played now; after a new start it is played again as far as it was."""

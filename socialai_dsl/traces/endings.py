@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
+from socialai_dsl.loader.reader import SUFFIXES, shipped_folder, without_comment
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.source import Source
 
@@ -67,7 +65,7 @@ def _ending(outcome: Any, sources: Mapping[str, Source], folder: Path) -> Ending
     if outcome.span is None:
         return Ending(outcome.name, outcome.success, prefix + _WITHOUT_A_LINE.get(name, name))
     line = sources[outcome.span.file].line(outcome.span.line).strip().removeprefix("- ").lstrip()
-    line = _without_comment(line)
+    line = without_comment(line)
     if line.startswith("{") and line.endswith("}"):
         line = line[1:-1].strip()
     file = short_file(outcome.span.file)
@@ -75,17 +73,6 @@ def _ending(outcome: Any, sources: Mapping[str, Source], folder: Path) -> Ending
     if path.is_relative_to(folder) and not path.is_relative_to(shipped_folder().resolve()):
         file = path.relative_to(folder).as_posix()  # wherever the scenario's files, or their copies, are
     return Ending(outcome.name, outcome.success, prefix + line, file, outcome.span.line)
-
-
-def _without_comment(line: str) -> str:
-    """A line of YAML up to the comment at its end, if there is one."""
-    try:
-        ends = [
-            token.end_mark.index for token in yaml.scan(line) if token.start_mark.index < token.end_mark.index
-        ]
-    except yaml.YAMLError:  # it goes on in the next line
-        return line
-    return line[: max(ends, default=len(line))]
 
 
 def short_file(file: str) -> str:
