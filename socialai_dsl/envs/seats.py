@@ -21,9 +21,6 @@ NOBODY: Final = "nobody"
 CALLER: Final = "caller"
 """Whose actions are those of `step`; said where the caller has several seats and somebody else others."""
 
-# The first words of a row of `State.keys`, which name an episode: seed, index, episode.
-_NAMES: Final = int(Key.EPISODE) + 1
-
 Seating = str | Mapping[str, Any]
 """`agent`, `all`, or the seats that others than the caller fill, by member of the cast."""
 
@@ -159,6 +156,13 @@ def _check_partner(name: str, partner: Any, programs: Sequence[Program]) -> None
         )
 
 
+def enter(player: Any, games: NDArray[np.bool_]) -> None:
+    """Let a policy that keeps something of rooms forget them, and nothing else, in games that go on with a session."""
+    forgets_rooms = getattr(player, "enter", None)
+    if forgets_rooms is not None and games.any():
+        forgets_rooms(games)
+
+
 class Company:
     """The partners of the caller in the games of a table: they act whenever the caller does.
 
@@ -173,7 +177,7 @@ class Company:
         self._partners: dict[int, tuple[Any, ...]] = {}
         self._sizes = table.merged.action_space().nvec.astype(np.uint64)
         self._sites = [np.uint64(draws.site(f"seats.{name}")) for name in seats.names]
-        self._begun = np.zeros((table.rows, _NAMES), np.uint64)  # seed, index and episode
+        self._begun = np.zeros((table.rows, Key.KEY), np.uint64)  # seed, index and episode of each game
         self._sit(dict(seats.partners))
 
     @property
@@ -218,18 +222,19 @@ class Company:
 
     def begin(self, begun: NDArray[np.bool_]) -> None:
         """Episodes have begun in some games, bool (E,)."""
-        names = self._table.state.keys[:, :_NAMES]
-        follows = names - self._begun == np.array([0, 0, 1], np.uint64)
-        goes_on = follows.all(1) & (names[:, Key.EPISODE] % self._table.sessions != 0)
-        self._begun[begun] = names[begun]
+        if not begun.any():
+            return
+        now = self._table.state.keys[:, : Key.KEY]
+        follows = (now - self._begun == np.array([0, 0, 1], np.uint64)).all(1)
+        enters = begun & follows & (now[:, Key.EPISODE] % self._table.sessions != 0)
+        forgets = begun & ~enters
+        self._begun[begun] = now[begun]
         for _, games, player in self._filled():
             if isinstance(player, str):
                 continue
-            forgets, enters = (begun & ~goes_on)[games], (begun & goes_on)[games]
-            if forgets.any():
-                player.reset(forgets)
-            if enters.any() and (enter := getattr(player, "enter", None)) is not None:
-                enter(enters)
+            if forgets[games].any():
+                player.reset(forgets[games])
+            enter(player, enters[games])
 
     def act(self, own: NDArray[Any]) -> NDArray[np.int64]:
         """The actions of all seats, int64 (E S, heads), where the caller's are `own`, game by game."""

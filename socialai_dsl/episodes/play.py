@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.scenario_env import encode_action
+from socialai_dsl.envs.seats import enter
 from socialai_dsl.episodes.policies import EpisodeOver, Observation, Policy, PolicyDone
 from socialai_dsl.episodes.room_sets import TEST_ROOMS, RoomSet
 from socialai_dsl.program_suite import ProgramSuite, outcome_name
@@ -479,8 +480,7 @@ def _begin(rooms: Rooms, players: Mapping[Seat, Policy], agenda: Agenda, ended: 
     for policy in players.values():
         if forgetting.any():
             policy.reset(forgetting.copy(), numbers.copy())
-        if entering.any() and (enter := getattr(policy, "enter", None)) is not None:
-            enter(entering.copy())
+        enter(policy, entering.copy())
 
 
 async def _all_asked(rooms: Rooms, players: Mapping[Seat, Policy], wait: float | None) -> dict[Seat, Int64]:

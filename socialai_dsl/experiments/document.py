@@ -98,11 +98,11 @@ def run_id(cell: Cell, seed: int, program: str, agent: str, code: Mapping[str, s
         agent: its name, or the digest of its weights.
         code: option -> digest of the file of the user's own that it names.
     """
-    options = config_of(cell, seed).model_dump(
-        exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"})}
+    config = config_of(cell, seed)
+    usual = {name for name in _CAME_LATER if getattr(config, name) == RunConfig.model_fields[name].default}
+    options = config.model_dump(
+        exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"}), *usual}
     )
-    usual = {name: RunConfig.model_fields[name].default for name in _CAME_LATER}
-    options = {name: value for name, value in options.items() if name not in usual or value != usual[name]}
     decisive = options | {"program": program, "agent": agent} | ({"code": dict(code)} if code else {})
     decisive |= {"trials": cell.trials} if cell.trials > 1 else {}
     asked = {name: value for name, value in cell.model.items() if name not in _WITHOUT_EFFECT}

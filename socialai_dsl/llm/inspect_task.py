@@ -28,6 +28,7 @@ from socialai_dsl.checking.briefing import Briefing, Tell, brief
 from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.envs.asking import probe_names
 from socialai_dsl.episodes.partners import Beside, beside
+from socialai_dsl.episodes.room_sets import RoomSet
 from socialai_dsl.frontend import load_experiment
 from socialai_dsl.llm.actions import Mode
 from socialai_dsl.llm.episode import CUT_SHORT, Episode, OnInvalid
@@ -141,11 +142,6 @@ class _Game:
     prompting: PromptOptions
     seats: Mapping[str, str]
 
-    @property
-    def session(self) -> int:
-        """How many episodes of it in a row share some of what is drawn."""
-        return self.played.program.session
-
     def episode(self) -> Episode:
         """An environment of its own."""
         loaded = self.played.loaded
@@ -245,13 +241,11 @@ def _task(
     probes = list(dict.fromkeys(probe for game in games for probe in game.probes()))
     samples = []
     for game in games:
-        endings, in_a_row = game.endings(), trials or game.session
+        endings, in_a_row = game.endings(), trials or game.played.program.session
         if episodes % in_a_row:
             raise ValueError(f"episodes: got {episodes}, expected a multiple of the {in_a_row} trials")
-        if seed is not None and game.session > 1:
-            raise ValueError(
-                f"seed: got {seed}, but {game.scenario} has sessions, which the test set alone has"
-            )
+        if seed is not None:
+            RoomSet.of_seed(seed).check(game.played.program)
         with closing(game.episode()) as episode:
             for number in range(0, episodes, in_a_row):
                 called = number if len(games) == 1 else f"{game.scenario} {number}"

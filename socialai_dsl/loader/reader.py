@@ -752,14 +752,3 @@ def yaml_files(folder: Path) -> list[str]:
 def yaml_files_below(folder: Path) -> list[str]:
     """The paths of the YAML files in a folder and those in it, sorted."""
     return sorted(str(path) for path in folder.rglob("*") if path.suffix in SUFFIXES and path.is_file())
-
-
-def without_comment(line: str) -> str:
-    """A line of YAML up to the comment at its end, if there is one."""
-    try:
-        ends = [
-            token.end_mark.index for token in yaml.scan(line) if token.start_mark.index < token.end_mark.index
-        ]
-    except yaml.YAMLError:  # it goes on in the next line
-        return line
-    return line[: max(ends, default=len(line))]

@@ -100,7 +100,7 @@ def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | Non
         return None
     for number in range(context.line_number, place.line_number + 1):
         line = context.source.line(number)
-        start = _comment_in(line)
+        start = comment_in(line)
         if start is not None and closing in line[start:]:
             comment = _Place(context.source, number, start + 1)
             message = f"not YAML: a `#` behind a blank begins a comment, which takes the `{closing}` along"
@@ -108,7 +108,7 @@ def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | Non
     return None
 
 
-def _comment_in(line: str) -> int | None:
+def comment_in(line: str) -> int | None:
     """Where the comment of a line begins."""
     quote, before = "", ":"
     for i, character in enumerate(line):

@@ -16,7 +16,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.checking.studies import is_rival, is_trained
 from socialai_dsl.envs import ScenarioVectorEnv
 from socialai_dsl.envs.factory import compiled
-from socialai_dsl.envs.seats import RANDOM, SCRIPT
+from socialai_dsl.envs.seats import RANDOM, SCRIPT, enter
 from socialai_dsl.envs.view import View
 from socialai_dsl.episodes.play import AGENT, Observer, Rooms, Seat
 from socialai_dsl.episodes.policies import Observation
@@ -185,6 +185,7 @@ class Episode:
         env: what it is played in. observers: are told of all that happens.
 
     Attributes:
+        trial: how many of the session have begun before this one; -1 before the first.
         t: steps so far. ending: None while it goes on. heard: of each seat, pairs of a step and a line.
         acting: the policies that were asked for, by seat.
     """
@@ -193,6 +194,7 @@ class Episode:
     players: Mapping[Seat, Callable[[], Any]]
     env: Any
     observers: Sequence[Observer] = ()
+    trial: int = -1
     t: int = 0
     ending: Ending | None = None
     heard: dict[Seat, list[tuple[int, str]]] = field(default_factory=dict)
@@ -210,7 +212,8 @@ class Episode:
             reset: arguments of `env.reset`.
             about: what chance follows from besides the seat and the step.
         """
-        if self.ending is None:
+        self.trial += 1
+        if self.trial == 0:
             self._first = about
         else:
             for unseen in self._unseen.values():
@@ -240,8 +243,8 @@ class Episode:
         for seen in self._unseen[seat]:
             if seen is not None:
                 self._own[seat] = np.asarray(self.acting[seat].act(seen))[0].tolist()
-            elif (enter := getattr(self.acting[seat], "enter", None)) is not None:
-                enter(everywhere)
+            else:
+                enter(self.acting[seat], everywhere)
         self._unseen[seat].clear()
         return self._own[seat]
 

@@ -136,7 +136,8 @@ class Games:
         found, now = self._running.get(game.id), game.episode
         assert now is not None, "internal: a game begins with an episode"
         if found is None:
-            arena, env = self._arenas[game.block], self._arenas[game.block].take()
+            arena = self._arenas[game.block]
+            env = arena.take()
             thinking = self._players.thinking(game.block)
             watching = () if thinking is None else tuple(thinking.seats.values())
             episode = Episode(arena, self._players.agents(game.block, env), env, watching)

@@ -86,11 +86,8 @@ class Players:
             return None
         from socialai_dsl.study.models import ModelSeat, Thinking
 
-        arena, endpoints, session = (
-            self._arenas[block],
-            self._endpoints,
-            session_of(self._loaded.played[block]),
-        )
+        arena, endpoints = self._arenas[block], self._endpoints
+        session = session_of(self._loaded.played[block])
         seats = {seat: ModelSeat(arena, seat, who, endpoints, session) for seat, who in models.items()}
         return Thinking(seats, self._study.blocks[block].act_within)
 

@@ -282,8 +282,10 @@ class Progress:
             case "episode":
                 game = self.games[event["game"]]
                 begun = Played(event["number"], event["room"])
-                goes_on = begun.number % self.session(game) != 0
-                game.before = [*game.before, *filter(None, [game.episode])] if goes_on else []
+                if begun.number % self.session(game) == 0:
+                    game.before = []
+                elif game.episode is not None:
+                    game.before.append(game.episode)
                 game.episode = begun
             case "step":
                 episode = self.games[event["game"]].episode

@@ -301,19 +301,6 @@ def _fitting(agent: str, loaded: LoadedStudy) -> tuple[dict[int, Arena], str]:
     return found, why
 
 
-@dataclass
-class _Mirror:
-    """A session of a game that is played beside the server's.
-
-    Attributes:
-        session: the game, and the number of its first episode. episode: that goes on. begun: how many have begun.
-    """
-
-    session: tuple[str, int]
-    episode: Episode
-    begun: int = 0
-
-
 class Simulated:
     """A simulated participant."""
 
@@ -330,7 +317,7 @@ class Simulated:
     ) -> None:
         self._server, self._at, self._code, self._kind = server, at, code, kind
         self._pace, self._speed, self._rng, self._mind = pace, speed, rng, mind
-        self._mirror: _Mirror | None = None
+        self._mirror: tuple[tuple[str, int], Episode] | None = None
         self._model: ModelSeat | None = None
         self._course = Course(kind)
         self._game: Screen = {}
@@ -459,16 +446,15 @@ class Simulated:
     def _mirrored(self, progress: Progress, game: Game, now: Played, seat: Seat) -> Episode:
         """The episode of a game as far as it is played, with all its session, where its mind looks from the seat."""
         session = game.id, now.number - len(game.before)
-        if self._mirror is None or self._mirror.session != session:
+        if self._mirror is None or self._mirror[0] != session:
             arena = self._mind.arenas[game.block]
-            self._mirror = _Mirror(session, self._beginning(arena, seat, progress.session(game)))
-        mirror, episode = self._mirror, self._mirror.episode
+            self._mirror = session, self._beginning(arena, seat, progress.session(game))
+        episode = self._mirror[1]
         for number, played in enumerate((*game.before, now)):
-            if number == mirror.begun:
-                episode.begin(reset_of(game.block, played.room), f"{game.id} {played.number}")
-                mirror.begun += 1
-            if number < mirror.begun - 1:
+            if number < episode.trial:
                 continue
+            if number > episode.trial:
+                episode.begin(reset_of(game.block, played.room), f"{game.id} {played.number}")
             for step in played.steps[episode.t :]:
                 if self._model is not None and step["by"][seat] != PERSON:
                     self._model.passed()

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.loader.reader import SUFFIXES, shipped_folder, without_comment
+from socialai_dsl.loader.reader import SUFFIXES, shipped_folder
+from socialai_dsl.loader.yaml_errors import comment_in
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.source import Source
 
@@ -65,7 +66,7 @@ def _ending(outcome: Any, sources: Mapping[str, Source], folder: Path) -> Ending
     if outcome.span is None:
         return Ending(outcome.name, outcome.success, prefix + _WITHOUT_A_LINE.get(name, name))
     line = sources[outcome.span.file].line(outcome.span.line).strip().removeprefix("- ").lstrip()
-    line = without_comment(line)
+    line = line[: comment_in(line)].rstrip()
     if line.startswith("{") and line.endswith("}"):
         line = line[1:-1].strip()
     file = short_file(outcome.span.file)

@@ -48,7 +48,7 @@ def play(config: Any, envs: EchoEnvs, rollouts: int = 1) -> tuple[Session, Rollo
 
 @pytest.mark.parametrize("episodes", [1, 2, 3])
 @pytest.mark.parametrize("returns", ["session", "episode"])
-def test_an_agent_forgets_where_a_session_begins(episodes: int, returns: str, small_config: Any) -> None:
+def test_memory_and_returns_last_a_session(episodes: int, returns: str, small_config: Any) -> None:
     envs = EchoEnvs(8, limit=2)
     envs.program.session = episodes
     session = Session.start(small_config(returns=returns, bootstrap_timeouts=True), envs)

@@ -159,15 +159,8 @@ def test_a_policy_on_a_seat_remembers_a_session(in_sessions: tuple[str, Noting])
     ):
         env.reset(**reset)  # type: ignore[arg-type]
     told = [word for word, _ in policy.notes]
-    assert told == [
-        "forgets",
-        "enters",
-        "enters",
-        "forgets",
-        "enters",
-        *["forgets", "enters"],
-        *["forgets"] * 3,
-    ]
+    first, second, middle = ["forgets", "enters", "enters"], ["forgets", "enters"], ["forgets", "enters"]
+    assert told == [*first, *second, *middle, *["forgets"] * 3]
 
 
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])

@@ -41,6 +41,7 @@ def ids(*arguments: Any, **named: Any) -> list[str]:
         ", tests: [help]",
         ", checkpoint_every: 7",
         ", row: a",
+        ", hyper: {returns: session}",
     ],
 )
 def test_what_makes_no_difference(tmp_path, condition):
@@ -62,6 +63,7 @@ def test_what_makes_no_difference(tmp_path, condition):
         ", eval_episodes: 7",
         ", curriculum: progress",
         ", hyper: {lr: 0.001}",
+        ", hyper: {returns: episode}",
     ],
 )
 def test_what_makes_a_difference(tmp_path, condition):
