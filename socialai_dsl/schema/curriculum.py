@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
@@ -78,4 +78,9 @@ class Curriculum(Model):
 
     curriculum: Word = Field(description="the name of the curriculum")
     about: Prose | None = Field(None, description="one sentence for readers of the file")
+    share: Literal["episodes", "frames"] = Field(
+        "episodes",
+        description="what the weights share out; with `frames` a member is drawn the less often, "
+        "the longer its latest episodes were",
+    )
     phases: Annotated[ListOf[Phase], Field(min_length=1)] = Field(description="one after another")

@@ -85,6 +85,21 @@ def test_groups_share_by_their_weights_and_keep_the_suites_own(tmp_path: Path) -
     assert np.array(weights) / sum(weights) == pytest.approx([3 / 16, 9 / 16, 4 / 16], abs=1e-5)
 
 
+def test_phases_may_share_the_frames(tmp_path: Path) -> None:
+    leaves = Leaves(("short", "long", "off"), ({}, {}, {}), (1, 1, 1))
+    path = written(tmp_path, "  - play: [{members: [short]}, {members: [long], weight: 3}]")
+    path.write_text(f"share: frames\n{path.read_text()}")
+    phases = Phases(load_curriculum(path), leaves)
+    for _ in range(100):
+        phases.observe(0, True, 5)
+        phases.observe(1, False, 30)
+    short, long, off = phases.weights()
+    assert (5 * short / (30 * long), off) == (pytest.approx(1 / 3, abs=1e-4), 0)
+    again = Phases(load_curriculum(path), leaves)
+    again.load_state(phases.state())
+    assert again.weights() == [short, long, 0], "a resumed run knows the lengths"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

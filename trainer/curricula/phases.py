@@ -8,6 +8,7 @@ from typing import Any
 
 from socialai_dsl.schema.curriculum import Curriculum, Group, Ramp
 from socialai_dsl.trainer.curricula.base import Leaves
+from socialai_dsl.trainer.curricula.even import Lengths
 
 _ONE = 1 << 20
 
@@ -28,13 +29,15 @@ class Phases:
         ]
         self._given = [[group.weight for group in phase.groups] for phase in plan.phases]
         self._digest = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
+        self._lengths = Lengths(len(leaves.names)) if plan.share == "frames" else None
         self.phase = 0
         self._episodes = 0
         self._last: list[int] = []
 
     def observe(self, member: int, success: bool, steps: int) -> None:
         """See `Curriculum.observe`; whichever member it was of, an episode counts for the phase it ends in."""
-        del member, steps
+        if self._lengths is not None:
+            self._lengths.observe(member, steps)
         until = self._plan.phases[self.phase].until
         self._episodes += 1
         if until is None:
@@ -53,13 +56,14 @@ class Phases:
         ]
         if sum(shares) <= 0:
             shares = [1.0] * len(shares)
-        weights = [0] * len(self._natural)
+        parts = [0.0] * len(self._natural)
         for share, members in zip(shares, self._groups[self.phase], strict=True):
             whole = sum(self._natural[member] for member in members)
             for member in members:
-                part = share / sum(shares) * self._natural[member] / whole
-                weights[member] += max(1, round(_ONE * part)) if share > 0 else 0
-        return weights
+                parts[member] += share / sum(shares) * self._natural[member] / whole
+        if self._lengths is not None:
+            return self._lengths.episodes_for(parts)
+        return [max(1, round(_ONE * part)) if part else 0 for part in parts]
 
     def state(self) -> dict[str, Any]:
         """See `Curriculum.state`."""
@@ -68,6 +72,7 @@ class Phases:
             "phase": self.phase,
             "episodes": self._episodes,
             "last": "".join(map(str, self._last)),
+            **({"lengths": self._lengths.state()} if self._lengths is not None else {}),
         }
 
     def load_state(self, state: dict[str, Any]) -> None:
@@ -77,6 +82,8 @@ class Phases:
         phase, episodes, last = state["phase"], state["episodes"], [int(digit) for digit in state["last"]]
         if not 0 <= phase < len(self._plan.phases) or episodes < 0 or set(last) - {0, 1}:
             raise ValueError("curriculum: the state is damaged")
+        if self._lengths is not None:
+            self._lengths.load_state(state["lengths"])
         self.phase, self._episodes, self._last = phase, episodes, last
 
 
