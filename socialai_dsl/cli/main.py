@@ -43,7 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words and not words[0].startswith("-") and words[0] not in _COMMANDS:
         return _unknown_command(words[0])
     # Loading all commands doubles the time to start; the others are needed for their summaries alone.
-    named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
+    if words and words[0] in _COMMANDS:
+        named: Sequence[str] = words[:1]
+    else:
+        named = () if words and words[0].startswith("--v") else _COMMANDS
     modules = {name: import_module(f"socialai_dsl.cli.{name}") for name in named}
     parser = _Parser(
         prog="socialai",
