@@ -15,20 +15,18 @@ from socialai_dsl.play.screen import PlayApp
 from socialai_dsl.reporting.records import CrossPlayRecord
 from socialai_dsl.runs.crossplay import crossplay
 
-HELP = "together/help_together"
-HORIZON = 20
-
-WAIT = """scenario: wait
-horizon: 4
+HORIZON = 4
+WAIT = f"""scenario: wait
+horizon: {HORIZON}
 actions: [left, right, forward]
-grammar: {templates: [<noun>], nouns: [hello]}
-room: {size: 5}
+grammar: {{templates: [<noun>], nouns: [hello]}}
+room: {{size: 5}}
 cast:
-  agent: {name: Ann, at: [1, 1], frame: stay}
-  bob: {name: Bob, at: [3, 3], seat: open, frame: stay}
-frames: {stay: {states: {staying: {}}}}
-rivals: {turns: {states: {turning: {do: turn_to(right)}}}}
-outcome: [{success: t == 3, for: agent}]
+  agent: {{name: Ann, at: [1, 1], frame: stay}}
+  bob: {{name: Bob, at: [3, 3], seat: open, frame: stay}}
+frames: {{stay: {{states: {{staying: {{}}}}}}}}
+rivals: {{turns: {{states: {{turning: {{do: turn_to(right)}}}}}}}}
+outcome: [{{success: t == 3, for: agent}}]
 """
 
 
@@ -52,20 +50,22 @@ def person(monkeypatch: pytest.MonkeyPatch) -> None:
     ("seats", "own"),
     [
         ({}, "agent"),
-        ({"jill": "random"}, "agent"),
-        ({"agent": "script"}, "jill"),
-        ({"agent": "random"}, "jill"),
+        ({"bob": "random"}, "agent"),
+        ({"agent": "script"}, "bob"),
+        ({"agent": "random"}, "bob"),
     ],
 )
 def test_a_person_has_the_seat_that_is_left(seats: dict[str, str], own: str, tmp_path: Path) -> None:
-    found = sd.evaluate("human", HELP, 2, out=tmp_path, seats=seats, record=0)
+    scenario = tmp_path / "wait.yaml"
+    scenario.write_text(WAIT, encoding="utf-8")
+    found = sd.evaluate("human", scenario, 2, out=tmp_path / "human", seats=seats, record=0)
     assert found.seat == own
     assert found.result.episodes == 2
-    (session,) = tmp_path.iterdir()
-    traces = sd.replay(session / "help_together", test_episodes=[0, 1])
+    (session,) = (tmp_path / "human").iterdir()
+    traces = sd.replay(session / "wait", test_episodes=[0, 1])
     for number, trace in enumerate(traces):
         assert (trace.own, len(trace.moments) - 1) == (own, found.result.lengths[number])
-        assert trace.players.keys() == {"agent", "jill"} - {own}
+        assert trace.players.keys() == {"agent", "bob"} - {own}
         moment = trace.moments[1]
         assert (moment.did if own == "agent" else moment.seats[0].did) == "left"
         assert trace.moments[-1].ended is not None
@@ -124,6 +124,8 @@ def test_a_trained_partner_is_known_by_its_network(tmp_path: Path) -> None:
 
 
 def test_practice_is_no_cell_of_cross_play(tmp_path: Path) -> None:
-    _, folder = play_seed(HELP, out=tmp_path)
+    scenario = tmp_path / "wait.yaml"
+    scenario.write_text(WAIT, encoding="utf-8")
+    _, folder = play_seed(str(scenario), out=tmp_path / "human")
     with pytest.raises(UsageError, match="holds what `socialai play` keeps, which is no test"):
-        crossplay(["oracle", folder], HELP, 2)
+        crossplay(["oracle", folder], str(scenario), 2)
