@@ -395,6 +395,8 @@ def check_meaning(
                 check_possible(checked, findings)  # else what is missing would seem never to happen
                 check_unseen(checked, scenario.observe.tone, findings)
             break
+    else:
+        raise AssertionError("internal: the types do not settle")
     bag.extend(_without_consequences(findings, scenario))
     return None if found.has_errors else checked
 

@@ -227,10 +227,12 @@ class _Resolved:
     Attributes:
         term: how it is read, or the known value in its place; None: it means nothing, which has been reported.
         drawn: what is given a value at reset, one for each of a group.
+        starts: the values that it may start with, but for what stands for nothing.
     """
 
     term: Term | None
     drawn: tuple[Drawn, ...] = ()
+    starts: tuple[Term, ...] = ()
 
 
 class Registers:
@@ -272,7 +274,7 @@ class Registers:
     def put(self, path: str, value: SitedTerm) -> Read:
         """A register that takes a value at reset which is resolved already."""
         read = Read(value.term.type, path)
-        self._resolved[path] = _Resolved(read, (Drawn(path, read.type, value),))
+        self._resolved[path] = _Resolved(read, (Drawn(path, read.type, value),), (value.term,))
         return read
 
     def remember(self, value: SitedTerm) -> Read:
@@ -411,16 +413,15 @@ class Registers:
             self.set_to.setdefault(path, []).append(value)
 
     def values_of(self, path: str) -> list[Term]:
-        """All that a register may hold: what it starts with, is set to, or notes for `prev`, be it `apart`.
+        """All that a register may hold but nothing: what it starts with, is set to, or notes for `prev`, be it `apart`.
 
         Empty where it has a range of its own.
         """
         declaration = self._declared.get(path)
         if declaration is not None and declaration.range is not None:
             return []
-        starts = declaration is None or not declaration.starts_with_nothing
-        drawn = [one.value.term for one in self._drawn(path) if starts]
-        return [*drawn, *self._noted.get(path, ()), *self.set_to.get(path, ())]
+        starts = self._resolved[path].starts if path in self._resolved else ()
+        return [*starts, *self._noted.get(path, ()), *self.set_to.get(path, ())]
 
     def type_of(self, path: str) -> Type | None:
         """The type that a register has been resolved with; None if it means nothing."""
@@ -445,6 +446,7 @@ class Registers:
         empties = declaration.starts_with_nothing or declaration.forgets
         empties = empties or any(may_be_nothing(start.term) for start, _ in starts)
         nothing = nothing_of(type_) if empties else None
+        values = () if declaration.starts_with_nothing else tuple(start.term for start, _ in starts)
         if nothing is not None:
             empty, always = Const(type_, nothing), declaration.starts_with_nothing
             starts = [
@@ -452,7 +454,7 @@ class Registers:
                 for start, called in starts
             ]
         drawn = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
-        self._resolved[path] = _Resolved(Read(type_, path, nothing), drawn)
+        self._resolved[path] = _Resolved(Read(type_, path, nothing), drawn, values)
 
     def _starts(self, declaration: Declaration) -> list[tuple[SitedTerm, str]]:
         """What each register of a declaration starts with, and its path."""

@@ -130,6 +130,24 @@ def test_there_is_room_for_what_a_belief_comes_to(meaning):
     assert register(checked, "guide.believes.later") == (0, 21)
 
 
+@pytest.mark.parametrize(("member", "range_"), [("seen", (-4, -4)), ("heard", (-4, 7)), ("own", (-4, -4))])
+def test_what_starts_with_what_may_be_nothing_has_no_more_room_for_it(meaning, member, range_):
+    """Each resolution once took the number that stands for nothing for one more value."""
+    beliefs = {
+        "seen": {"of": "price", "when": "t > 7"},
+        "heard": {"from": [{"of": "price"}, {"of": 7, "when": "t > 9"}]},
+    }
+    frames = {"count": {"let": {"own": "price"}, "states": {"s": {"then": [{"set": {"own": "price"}}]}}}}
+    checked = meaning(
+        state={"price": {"start": "none"}},
+        rules=[{"when": "t > 5", "set": {"price": -4}}],
+        frames=frames,
+        cast={"guide": {"frame": "count", "beliefs": beliefs}},
+    )
+    path = "guide.own" if member == "own" else f"guide.believes.{member}"
+    assert register(checked, path) == range_
+
+
 @pytest.mark.parametrize(("start", "rounds"), [(0, 2), ({"start": 0, "range": "0..9"}, 1), ("pick(0..9)", 1)])
 def test_a_scenario_is_resolved_again_only_where_a_range_is_wider(meaning, monkeypatch, start, rounds):
     count = 0
