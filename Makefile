@@ -24,7 +24,7 @@ run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="-
 	$(BIN)/socialai-run scenarios/talkitout.yaml $(ARGS)
 
 # Not those of pages in a browser: Playwright leaves an event loop running, in which no other test can run its own.
-PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile --ignore tests/browser
+PARALLEL := --numprocesses auto --dist loadfile --ignore tests/browser
 
 test: $(STAMP) ## run the tests, on up to four cores at once
 	$(BIN)/python -m pytest $(PARALLEL) $(ARGS)
