@@ -35,7 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """One process more than cores, of which four are used: tests of terminals and servers wait a third of their time."""
+    """One process more than cores, of which it uses four: tests of terminals and servers wait a third of the time."""
     return min(4, os.cpu_count() or 1) + 1
 
 

@@ -114,7 +114,7 @@ SPOKEN_OF = (
 
 
 def test_random_scenarios_have_what_there_is_of_seats() -> None:
-    texts = [write_seated(seed) for seed in range(20)]
+    texts = [write_seated(seed) for seed in range(40)]
     assert [word for word in SPOKEN_OF if not any(word in text for text in texts)] == []
     assert all(SEAT in text for text in texts)
     assert SEAT not in write(0), "the files of seeds are otherwise as they were"

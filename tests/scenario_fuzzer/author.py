@@ -96,6 +96,8 @@ class _Author:
         made["grammar"] = made["grammar"] or self.grammar_with_slots()
         looks = self.looks()
         tables, lets, state = self.tables(), self.lets(), self.state()
+        for beliefs in self.declared.beliefs.values() if self.single_numbers() else ():
+            beliefs["amount"] = "number"
         made |= {"objects": objects} if objects else {}
         made |= {"looks": looks} if looks else {}
         made |= {"tables": tables} if tables else {}
@@ -414,7 +416,7 @@ class _Author:
             holds = self.rng.choice(("number", "color", *nouns))
             made.append(Row(f"{kept}_{number}", self.rng.choice(groups), holds, self.often(0.5)))
         if self.often(0.3):
-            made.append(Row(single, None, self.rng.choice(("color", *nouns)), True))
+            made.append(Row(single, None, self.rng.choice(("number", "color", *nouns)), True))
         return made
 
     def starts(self, rows: list[Row]) -> dict[str, Any]:
@@ -435,7 +437,8 @@ class _Author:
                 start = "first(k in nouns where k == k)" if row.keys == "nouns" else "pick(nouns)"
             made[row.name] = {"start": start}
             made[row.name] |= {"for": row.keys} if row.keys else {}
-            made[row.name] |= {"range": f"0..{self.rng.randint(3, 6)}"} if row.holds == "number" else {}
+            ranged = row.holds == "number" and (row.keys is not None or self.often(0.5))
+            made[row.name] |= {"range": f"0..{self.rng.randint(3, 6)}"} if ranged else {}
         return made
 
     def definitions(self) -> dict[str, str]:
@@ -522,6 +525,10 @@ class _Author:
             sorts["lies"] = "thing"
         chosen = self.rng.sample(sorted(sorts), self.rng.randint(1, 2))
         return {name: sorts[name] for name in chosen}
+
+    def single_numbers(self) -> list[str]:
+        """Registers of the world that begin with nothing and then hold a number."""
+        return [row.name for row in self.declared.rows if row.keys is None and row.holds == "number"]
 
     def frame(self, frame: Frame, behaviour: Behaviour) -> dict[str, Any]:
         """What a frame holds and does."""
@@ -625,6 +632,7 @@ class _Author:
                 else "agent.color"
             ),
             "cell": lambda: "agent.cell",
+            "number": lambda: self.rng.choice(self.single_numbers()),
             "thing": lambda: f"{self.phrases.one(self.declared.group(what), where)}.inside",
         }
 

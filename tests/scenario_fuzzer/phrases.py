@@ -164,7 +164,7 @@ class Phrases:
     def value_of(self, row: Row, where: Where) -> str:
         """Something to put into a row."""
         if row.holds == "number":
-            return self.number(where)
+            return self.number(where) if row.keys else f"min(max({self.number(where)}, -9), 9)"
         if row.holds == "color":
             return self.color(where)
         plain = [noun for noun in self.declared.nouns if isinstance(noun, str) and noun not in (*COLORS, "3")]
@@ -587,6 +587,7 @@ class Phrases:
                     "color": f"X.believes.{belief} == {self.rng.choice(COLORS)}",
                     "thing": f"agent.next_to(X.believes.{belief})",
                     "cell": f"agent.distance(X.believes.{belief}) < 3",
+                    "number": f"X.believes.{belief} > {self.rng.randint(0, 3)}",
                 }[sort]
                 options.append(self.asked_of(npc, condition))
         return self.one_of(*options) if options else self.of_this_step(where)
