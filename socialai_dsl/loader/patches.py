@@ -140,6 +140,7 @@ _DESCRIPTION: Final = keys_that_hold(VariantFile, "prose")
 _MAPPINGS, _LISTS = map(frozenset, sections_of(Scenario))
 _OF_SUITES = tuple(map(frozenset, sections_of(Suite)))
 _OF_VARIANTS = sections_of(VariantFile)
+_CHANGED: Final = frozenset(keys_of(Scenario))
 
 
 def _sections(root: Node) -> tuple[frozenset[str], frozenset[str]]:
@@ -372,7 +373,9 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
     for key, part in root.children.items():
         if key not in VARIANT_KEYS:
             suggestion = did_you_mean(key, VARIANT_KEYS)
-            hint = None if suggestion else "a variant has `of`, `remove`, `set`, `add` and `about`"
+            own = "a variant has `of`, `remove`, `set`, `add` and `about`"
+            changes = f"`set: {{{key}: ...}}` changes the scenario's" if key in _CHANGED else own
+            hint = None if suggestion else changes
             message = f"unknown key `{key}` in a variant"
             found.error("S101", message, part.key_span(), hint=hint, suggestion=suggestion)
     base = root.entry("of")

@@ -155,6 +155,9 @@ _MEANT: Final = {
 _EXTENDS = "extends"
 """A key that is gone when the models see a file."""
 
+_OF_VARIANTS: Final = ("remove", "set", "add")
+"""Keys of variants, which authors write in a scenario that builds on another."""
+
 
 class _Mender:
     """Moves keys that are indented one level too little or too much; reports S101 once for keys that follow each other.
@@ -495,6 +498,8 @@ class _Report:
         else:
             meant = _MEANT.get(key)
             near = meant if meant in known else did_you_mean(key, known)
+            if owner is Scenario and key in _OF_VARIANTS:
+                near = None
             if near is None and owner is Register:
                 near = self._left_over(finding.path[:-1], key, known)
             bound = near == "range" and owner is Register and ".." not in str(finding.value)
@@ -535,6 +540,8 @@ class _Report:
             self._bag.error("S103", message, span, hint=hint)
             return
         hint = None if near else f"`{key}` belongs to {elsewhere}" if elsewhere else f"its keys are {listed}"
+        if owner is Scenario and key in _OF_VARIANTS:
+            hint = f"what differs from the file that it extends stands in own keys; `{key}` is for variants (`of:`)"
         self._bag.error("S101", f"unknown key `{key}` in {called}", span, suggestion=near, hint=hint)
 
     def _missing_key(self, finding: _Finding) -> None:

@@ -297,3 +297,21 @@ def _end_of_block(lines: list[str], first: int, indentation: int) -> int:
             break
         end += 1
     return end
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("scenario: shorter\nextends: talkitout\nset: {horizon: 9}\n", "own keys"),
+        ("scenario: shorter\nextends: talkitout\nremove: [probes]\n", "own keys"),
+        ("variant: shorter\nof: talkitout\nhorizon: 9\n", "`set: {horizon: ...}`"),
+    ],
+)
+def test_a_key_of_the_other_way_to_change_a_scenario(text: str, says: str, tmp_path: Path) -> None:
+    """It is no misspelt key: `set` is not meant to be `let`."""
+    path = tmp_path / "shorter.yaml"
+    path.write_text(text, encoding="utf-8")
+    (found,) = check(path).diagnostics
+    assert (found.code, found.span.line) == ("S101", 3)
+    assert found.suggestion is None
+    assert says in str(found.hint)
