@@ -63,9 +63,10 @@ class Endpoints:
             raise ModelFailed("the budget is spent")
         endpoint = self._endpoints[who]
         try:
-            client = self._clients.setdefault(who, endpoint.client())
+            if who not in self._clients:
+                self._clients[who] = endpoint.client()
             messages, more = conversation.messages(), conversation.constraints()
-            answer = await endpoint.ask(client, messages, more, who in self._answered)
+            answer = await endpoint.ask(self._clients[who], messages, more, who in self._answered)
         except ContextFull:
             return Answer("", stop="context")
         except EndpointError as error:

@@ -84,8 +84,14 @@ def test_where_an_agent_does_not_play_chance_does_and_the_report_says_it(place: 
 
 
 @pytest.mark.parametrize("answer", ["Act: left", (401, {}, b"no key")])
-def test_a_language_model_takes_part_and_chance_plays_where_it_fails(answer: Any, tmp_path: Path) -> None:
+def test_a_language_model_takes_part_and_chance_plays_where_it_fails(
+    answer: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("httpx", reason="language models need the extra llm")
+    from socialai_dsl.llm.endpoint import Endpoint
+
+    clients, connect = [], Endpoint.client
+    monkeypatch.setattr(Endpoint, "client", lambda endpoint: clients.append(connect(endpoint)) or clients[-1])
     with endpoint(lambda request: answer) as stub:
         text = GUIDES + f'model: {{base_url: "{stub.url}"}}\n'
         loaded = loaded_study(text, tmp_path)
@@ -94,6 +100,7 @@ def test_a_language_model_takes_part_and_chance_plays_where_it_fails(answer: Any
     (course,) = found.courses
     assert course.finished
     assert len(stub.requests) >= course.acts > 0
+    assert [client.is_closed for client in clients] == [True], "one is enough for all requests"
     moves = Counter(e["acts"]["agent"][0] for e in read_log(tmp_path / "out" / FILE) if e["event"] == "step")
     if answer == "Act: left":
         assert (course.by_chance, set(moves)) == (0, {0})
