@@ -230,7 +230,7 @@ def _keep_alone(name: str, keys: dict[str, Node], bag: DiagnosticBag) -> None:
     """Leave out what only groups have: `count`, and lists of one value for each."""
     if "count" in keys:
         bag.error("S101", "there is one agent, so it has no `count`", keys.pop("count").key_span())
-    misspelt = [key for key in keys if did_you_mean(key, [*_KEYS, "count"]) == "count"]
+    misspelt = [key for key in keys if key not in _KEYS and did_you_mean(key, [*_KEYS, "count"]) == "count"]
     for key in misspelt:
         message = f"unknown key `{key}` in a member of the cast"
         bag.error("S101", message, keys.pop(key).key_span(), suggestion="count")

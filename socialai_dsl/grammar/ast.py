@@ -7,11 +7,12 @@ always the leftmost character of the node), so a loader can turn it into file:li
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
 from itertools import islice, pairwise
 from math import gcd
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, TypeVar
 
@@ -41,11 +42,11 @@ def walk(tree: object) -> Iterator[Any]:
     waiting: list[Any] = [tree]
     while waiting:
         value = waiting.pop()
-        if isinstance(value, tuple | list):
-            waiting.extend(reversed(value))
-        elif _is_node(value.__class__):
-            yield value
-            waiting.extend(getattr(value, name) for name in reversed(_names(value.__class__)))
+        parts = _parts_of(value.__class__)
+        if parts is not None:
+            if parts is not reversed:
+                yield value
+            waiting.extend(parts(value))
 
 
 def every(kind: type[Kind], tree: object) -> Iterator[Kind]:
@@ -94,6 +95,19 @@ def _names(kind: type) -> tuple[str, ...]:
     if not hasattr(kind, "__dataclass_fields__"):
         return ()
     return tuple(field.name for field in fields(kind) if {*re.findall(r"\w+", str(field.type))} - _PLAIN)
+
+
+@cache
+def _parts_of(kind: Any) -> Callable[[Any], Iterable[Any]] | None:
+    """What gives the parts of a value of a kind, the last one first: its items, or its fields; None if it has none."""
+    if issubclass(kind, tuple | list):
+        return reversed
+    if not _is_node(kind):
+        return None
+    names = _names(kind)[::-1]
+    if len(names) > 1:
+        return attrgetter(*names)
+    return lambda value: [getattr(value, name) for name in names]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
