@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -21,6 +22,7 @@ from socialai_dsl.trainer.config import RunConfig
 from socialai_dsl.trainer.errors import CheckpointError
 from socialai_dsl.trainer.files import CHECKPOINTS, SUFFIX, checkpoint_files
 from socialai_dsl.trainer.nets import ActorCritic, NetSpec, build_net
+from socialai_dsl.trainer.nets.lines import marks
 from socialai_dsl.trainer.shipped import located
 
 FORMAT = 2
@@ -265,6 +267,7 @@ def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list
         old = model.reader_class(vocabulary).words
     except ValueError as error:
         raise CheckpointError(f"checkpoint's vocabulary does not fit its network: {error}") from error
+    _move_speakers(weights, model, old)
     position = {word: index for index, word in enumerate(old)}
     for name in model.word_rows:
         source, fresh = weights.get(name), model.state_dict()[name].clone()
@@ -274,6 +277,23 @@ def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list
             if word in position:
                 fresh[index] = source[position[word]]
         weights[name] = fresh
+
+
+def _move_speakers(weights: dict[str, Tensor], model: ActorCritic, old: Sequence[str]) -> None:
+    """Rearrange the slices that belong to speakers.
+
+    One whom the agent never heard is the mean of those that are gone, whose place it may have, or, if none is, of all.
+    """
+    words = model.reader.words
+    known, there = [old[mark] for mark in marks(old)], [words[mark] for mark in marks(words)]
+    gone = [speaker for speaker in known if speaker not in there] or known
+    for name, axis in model.speaker_axes.items():
+        source = weights.get(name)
+        if not known or source is None or source.dim() <= axis or source.shape[axis] != len(known):
+            raise CheckpointError(f"checkpoint's {name} does not fit its speakers")
+        own = dict(zip(known, source.unbind(axis), strict=True))
+        stranger = torch.stack([own[speaker] for speaker in gone]).mean(0)
+        weights[name] = torch.stack([own.get(speaker, stranger) for speaker in there], axis)
 
 
 def _widened(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -10,6 +10,7 @@ import stat
 import subprocess
 import sys
 import zipfile
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -468,6 +469,40 @@ def test_words_of_letters_are_moved_by_their_own_spelling(small_config: Any, tmp
 
 def rows_by_word(net: Any) -> dict[str, torch.Tensor]:
     return dict(zip(net.reader.words, net.dialogue.embedding.weight.detach(), strict=False))
+
+
+@pytest.mark.parametrize(
+    ("speakers", "whose"),
+    [
+        ("bob ann", {"ann": "ann", "bob": "bob"}),
+        ("ann cid", {"ann": "ann", "cid": "bob"}),
+        ("ann cid dee", {"ann": "ann", "cid": "bob", "dee": "bob"}),
+        ("cid ann bob", {"ann": "ann", "bob": "bob", "cid": "ann bob"}),
+        ("bob", {"bob": "bob"}),
+    ],
+)
+@pytest.mark.parametrize("net", ["speakers", "relations"])
+def test_what_belongs_to_speakers_follows_their_names(
+    net: str, speakers: str, whose: dict[str, str], small_config: Any, tmp_path: Path
+) -> None:
+    """One whom the agent never heard is the mean of those who are gone, or, if nobody is, of all."""
+
+    def heard(*names: str) -> EchoEnvs:
+        envs = EchoEnvs(8)
+        envs.program.vocabulary = ["<pad>", "<unk>", *(f"<{name}>" for name in names), *names, "red", "yes"]
+        return envs
+
+    session = Session.start(small_config(net=net), heard("ann", "bob"))
+    path, names = write(tmp_path, session.checkpoint()), speakers.split()
+    with pytest.warns(UserWarning, match="vocabulary differs") if "cid" in names else nullcontext():
+        made = restored(path, heard(*names))
+    old, word = session.actor.net, {"ann": 0, "bob": 1}
+    for name, axis in made.speaker_axes.items():
+        before = old.get_parameter(name).detach().unbind(axis)
+        for place, after in enumerate(made.get_parameter(name).detach().unbind(axis)):
+            wanted = torch.stack([before[word[one]] for one in whose[names[place]].split()]).mean(0)
+            rows = slice(-2, None) if name in made.word_rows else slice(None)  # the words that both have
+            assert torch.equal(after[rows], wanted[rows]), (name, names[place])
 
 
 def test_a_vocabulary_that_the_network_has_no_room_for_is_refused(small_config: Any) -> None:

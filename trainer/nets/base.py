@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -133,6 +135,8 @@ class ActorCritic(nn.Module, ABC):
         precision: number type of that bulk; everything else, and all that is stored, is float32.
         word_rows: the parameters with one row for each word; an agent that plays with another vocabulary keeps the rows
             of the words that both have.
+        speaker_axes: parameter -> the axis along which it has one slice for each speaker that tokens mark; an agent
+            that plays with others keeps the slices of those that both have, and takes the mean of all for a stranger.
         reader_class: how histories are read before they are encoded; `reader` is one for the scenario's words.
         sight_class: how images are seen before anything is computed; `sight` is one for the scenario's images.
     """
@@ -142,6 +146,7 @@ class ActorCritic(nn.Module, ABC):
     smallest_share = 1024
     precision: Precision = "float32"
     word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
+    speaker_axes: Mapping[str, int] = MappingProxyType({})
     reader_class: type[Reader] = Reader
     sight_class: type[Sight] = Sight
 

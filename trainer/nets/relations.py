@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import ClassVar, Final
 
 import torch
 from torch import Tensor, nn
@@ -55,6 +55,7 @@ class RelationsNet(FastNet):
         *("mentions", "lines", "forms", "partners", "dialogue.each.0.embedding.weight"),
         *("dialogue.each.0.summed", "dialogue.each.1.pairs", "dialogue.each.1.placed"),
     )
+    _SPEAKER_AXES: ClassVar = {"lines": 1, "dialogue.each.0.summed": 1, "chosen.weight": 1}
     dialogue: Together  # type: ignore[assignment]
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
@@ -92,6 +93,7 @@ class RelationsNet(FastNet):
                     self.mentions[word, _COLOR, COLORS.index(name)] = self.lexicon
         own = dict(self.named_parameters())
         self.word_rows = tuple(name for name in self._WORD_ROWS if name in own)
+        self.speaker_axes = self._SPEAKER_AXES if self.speakers else {}
 
     def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
