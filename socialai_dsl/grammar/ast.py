@@ -44,7 +44,7 @@ def walk(tree: object) -> Iterator[Any]:
         value = waiting.pop()
         parts = _parts_of(value.__class__)
         if parts is not None:
-            if parts is not reversed:
+            if parts is not reversed:  # a node, and no list of nodes
                 yield value
             waiting.extend(parts(value))
 
