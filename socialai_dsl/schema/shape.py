@@ -498,8 +498,7 @@ class _Report:
         else:
             meant = _MEANT.get(key)
             near = meant if meant in known else did_you_mean(key, known)
-            if owner is Scenario and key in _OF_VARIANTS:
-                near = None
+            near = None if owner is Scenario and key in _OF_VARIANTS else near
             if near is None and owner is Register:
                 near = self._left_over(finding.path[:-1], key, known)
             bound = near == "range" and owner is Register and ".." not in str(finding.value)
@@ -541,7 +540,7 @@ class _Report:
             return
         hint = None if near else f"`{key}` belongs to {elsewhere}" if elsewhere else f"its keys are {listed}"
         if owner is Scenario and key in _OF_VARIANTS:
-            hint = f"what differs from the file that it extends stands in own keys; `{key}` is for variants (`of:`)"
+            hint = f"write what differs from the extended file as keys of its own; `{key}` is for variants (`of:`)"
         self._bag.error("S101", f"unknown key `{key}` in {called}", span, suggestion=near, hint=hint)
 
     def _missing_key(self, finding: _Finding) -> None:

@@ -302,8 +302,8 @@ def _end_of_block(lines: list[str], first: int, indentation: int) -> int:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("scenario: shorter\nextends: talkitout\nset: {horizon: 9}\n", "own keys"),
-        ("scenario: shorter\nextends: talkitout\nremove: [probes]\n", "own keys"),
+        ("scenario: shorter\nextends: talkitout\nset: {horizon: 9}\n", "for variants"),
+        ("scenario: shorter\nextends: talkitout\nremove: [probes]\n", "for variants"),
         ("variant: shorter\nof: talkitout\nhorizon: 9\n", "`set: {horizon: ...}`"),
     ],
 )

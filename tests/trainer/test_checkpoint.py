@@ -497,6 +497,7 @@ def test_what_belongs_to_speakers_follows_their_names(
     with pytest.warns(UserWarning, match="vocabulary differs") if "cid" in names else nullcontext():
         made = restored(path, heard(*names))
     old, word = session.actor.net, {"ann": 0, "bob": 1}
+    assert made.speaker_axes
     for name, axis in made.speaker_axes.items():
         before = old.get_parameter(name).detach().unbind(axis)
         for place, after in enumerate(made.get_parameter(name).detach().unbind(axis)):

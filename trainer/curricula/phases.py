@@ -28,7 +28,9 @@ class Phases:
             for p, phase in enumerate(plan.phases)
         ]
         self._given = [[group.weight for group in phase.groups] for phase in plan.phases]
-        self._digest = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
+        # Without the default, which the plans of earlier checkpoints do not have.
+        written = plan.model_dump_json(exclude={"share"} if plan.share == "episodes" else None)
+        self._digest = hashlib.sha256(written.encode()).hexdigest()
         self._lengths = Lengths(len(leaves.names)) if plan.share == "frames" else None
         self.phase = 0
         self._episodes = 0

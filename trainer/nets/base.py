@@ -136,7 +136,8 @@ class ActorCritic(nn.Module, ABC):
         word_rows: the parameters with one row for each word; an agent that plays with another vocabulary keeps the rows
             of the words that both have.
         speaker_axes: parameter -> the axis along which it has one slice for each speaker that tokens mark; an agent
-            that plays with others keeps the slices of those that both have, and takes the mean of all for a stranger.
+            that plays with others keeps the slices of those that both have, and a stranger gets the mean of those of
+            speakers who are missing, or, if nobody is, of all.
         reader_class: how histories are read before they are encoded; `reader` is one for the scenario's words.
         sight_class: how images are seen before anything is computed; `sight` is one for the scenario's images.
     """
