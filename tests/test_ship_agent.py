@@ -120,11 +120,11 @@ def test_the_test_of_mcnemar(lost: int, won: int, chance: float) -> None:
     assert chance_of_difference(lost, won) == pytest.approx(chance)
 
 
-def test_only_plain_scenarios_that_ship_and_finished_runs(run: Path, tmp_path: Path) -> None:
+def test_only_scenarios_that_ship_without_parameters_and_finished_runs(run: Path, tmp_path: Path) -> None:
     renamed = shutil.copytree(run, tmp_path / "run")
     settings = content(renamed / "config.json")
-    (renamed / "config.json").write_text(json.dumps(settings | {"scenario": "help+unsocial"}))
-    with pytest.raises(Refused, match=r"help\+unsocial: expected the plain name of a scenario that ships"):
+    (renamed / "config.json").write_text(json.dumps(settings | {"scenario": "dance?length=3"}))
+    with pytest.raises(Refused, match=r"dance\?length=3: expected a scenario that ships, without parameters"):
         ship(renamed, tmp_path, COMMIT)
     (renamed / "result.json").unlink()
     with pytest.raises(UsageError, match="expected a finished run"):
@@ -151,6 +151,8 @@ def test_its_exit_codes(
     assert ended(tmp_path) == 2
     assert "is not a run's folder" in capsys.readouterr().err
     own = shutil.copytree(run, tmp_path / "own")
-    (own / "config.json").write_text(json.dumps(content(own / "config.json") | {"scenario": "help+unsocial"}))
+    (own / "config.json").write_text(
+        json.dumps(content(own / "config.json") | {"scenario": "dance?length=3"})
+    )
     assert ended(own) == 1
-    assert capsys.readouterr().err.startswith("refused: help+unsocial: ")
+    assert capsys.readouterr().err.startswith("refused: dance?length=3: ")

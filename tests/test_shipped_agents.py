@@ -18,7 +18,7 @@ from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.loader.shipped import IDS
 from socialai_dsl.trainer import checkpoint as checkpoints
 from socialai_dsl.trainer.play import CheckpointPolicy
-from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agents_folder, located, shipped_agents
+from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agent_name, agents_folder, located, shipped_agents
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
 
 Capture = pytest.CaptureFixture[str]
@@ -45,9 +45,9 @@ def figures_of(name: str) -> tuple[float, dict[str, Any]]:
 )
 def test_an_agent_plays_as_its_card_says(name: str) -> None:
     """The same rooms and the same random numbers: only the rounding of another machine can differ."""
-    envs = socialai_dsl.make_vec(name, num_envs=125, copy=False, autoreset_mode="Disabled")
-    result = evaluate_policy(CheckpointPolicy.load(PREFIX + name, envs), envs, EPISODES)
     promised, recorded = figures_of(name)
+    envs = socialai_dsl.make_vec(recorded["scenario"], num_envs=125, copy=False, autoreset_mode="Disabled")
+    result = evaluate_policy(CheckpointPolicy.load(PREFIX + name, envs), envs, EPISODES)
     assert recorded["eval"]["episodes"] == EPISODES
     assert promised == pytest.approx(recorded["eval"]["success_rate"], abs=1e-4)
     assert result.success_rate == pytest.approx(promised, abs=ROUNDING)
@@ -66,15 +66,18 @@ def test_an_agent_is_small_and_was_made_for_its_scenario(name: str) -> None:
         kinds = {weights.get_slice(tensor).get_dtype() for tensor in weights.keys()}  # noqa: SIM118
     assert "F32" not in kinds, "half precision is enough"
     meta = checkpoints.read_agent(PREFIX + name).meta
-    assert meta.config.scenario == name
-    same = socialai_dsl.compile(socialai_dsl.load(name)).sha256 == meta.program_sha256
+    scenario = figures_of(name)[1]["scenario"]
+    assert meta.config.scenario == scenario
+    assert agent_name(*scenario.split("+")) == name
+    same = socialai_dsl.compile(socialai_dsl.load(scenario)).sha256 == meta.program_sha256
     assert same, f"the program of {name} has changed: python tools/ship_agent.py {folder}"
 
 
 @pytest.mark.parametrize("name", AGENTS)
 def test_a_card_says_how_its_agent_was_made_and_nothing_of_a_machine(name: str) -> None:
     settings = json.loads((agents_folder() / name / "config.json").read_text(encoding="utf-8"))
-    trained_on = figures_of(name)[1].get("trained_on", name)
+    result = figures_of(name)[1]
+    trained_on = result.get("trained_on", result["scenario"])
     (command,) = re.findall(rf"Trained again by `socialai-run {re.escape(trained_on)} ([^`]+)`", card(name))
     assert f"--recipe {settings['recipe']} --frames {settings['frames']}" in command
     assert re.search(r"\| trained \| \d{4}-\d\d-\d\d, with commit `[0-9a-f]{40}` \|", card(name))
@@ -131,12 +134,13 @@ def test_a_name_that_does_not_ship_is_refused_with_those_that_do() -> None:
         ("help+as_helper+unsocial", "help_as_helper"),
         ("social_env?split=test", "social_env"),
         ("novel/shop+unsocial", "novel/shop"),
+        ("talkitout+marked+unsocial", "talkitout_marked"),
     ],
 )
 def test_a_scenario_has_the_agent_of_its_name_however_it_is_called(
     scenario: str, agent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known = ["help", "help_as_helper", "novel/shop", "social_env"]
+    known = ["help", "help_as_helper", "novel/shop", "social_env", "talkitout", "talkitout_marked"]
     monkeypatch.setattr(players, "shipped_agents", lambda: known)
     spec = scenario.replace("SHIPPED", str(shipped_folder()))
     assert players.named_agent("shipped", spec) == PREFIX + agent
@@ -164,7 +168,7 @@ def test_a_scenario_without_an_agent_is_told_which_have_one(tmp_path: Path, caps
     for scenario in ("novel/shop", str(own)):
         assert run_main([scenario, "--agent", "shipped", "--out", str(tmp_path / "none")]) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert "no agent ships for it; these scenarios have one:" in line
+        assert "no agent ships for it; these agents ship:" in line
         assert QUICK in line
     assert not (tmp_path / "none").exists()
 

@@ -13,7 +13,10 @@ It refuses, with exit code 1, where
 * half precision plays differently. Only episodes that one of the two wins and the other loses tell them apart; if
   neither is better, each of these falls to either with probability 1/2. The exact two-sided test of that (McNemar's)
   must not reject it at the level 0.05;
-* the folder would be larger than 1 MiB, the scenario does not ship, or the run has code of one's own.
+* the folder would be larger than 1 MiB, the scenario does not ship, it has parameters, or the run has code of
+  one's own.
+
+The agent of a variant ships beside that of its scenario: that of `talkitout+marked` as `shipped:talkitout_marked`.
 
 An agent that ships can be shipped again, from its own folder: `python tools/ship_agent.py agents/talkitout`. This is
 for a compiler that gives the same scenario another program, so that the agent's digest is renewed; the agent must
@@ -53,7 +56,7 @@ from socialai_dsl.runs.export import finished_agent, write_agent
 from socialai_dsl.runs.folder import CONFIG, RESULT
 from socialai_dsl.trainer import checkpoint as checkpoints
 from socialai_dsl.trainer.checkpoint import Checkpoint
-from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agents_folder
+from socialai_dsl.trainer.shipped import PREFIX, WEIGHTS, agent_name, agents_folder
 
 EPISODES = 500
 ROUNDING = 0.01
@@ -115,15 +118,15 @@ def identical(one: Evaluation, other: Evaluation) -> int:
     return sum(np.array_equal(one.actions[number], other.actions[number]) for number in one.actions)
 
 
-def shipped_name(loaded: Any, scenario: str) -> str:
-    """The name under which the agent ships: that of its scenario.
+def shipped_scenario(loaded: Any, scenario: str) -> str:
+    """The scenario for which an agent ships, by its name.
 
     Raises:
-        Refused: the scenario does not ship, or is a variant by name or parameters.
+        Refused: it does not ship, or has parameters.
     """
     moved = MovedScenario.of(loaded, scenario)
-    if moved.texts or set("+?") & set(moved.scenario):
-        raise Refused(f"{scenario}: expected the plain name of a scenario that ships")
+    if moved.texts or "?" in moved.scenario:
+        raise Refused(f"{scenario}: expected a scenario that ships, without parameters")
     return moved.scenario
 
 
@@ -181,7 +184,8 @@ def ship(
     if plays is not None:
         trained_on, loaded = trained_on or config.scenario, socialai_dsl.load(plays)
         config = config.model_copy(update={"scenario": plays})
-    name = shipped_name(loaded, config.scenario)
+    scenario = shipped_scenario(loaded, config.scenario)
+    name = agent_name(*scenario.split("+"))
     if config.own_files or ":" in config.net:
         raise Refused(f"{run}: was trained with code of one's own, which does not ship")
     # Its digest is that of the present program: the comparison with the run's figures says that it means the same.
@@ -193,10 +197,10 @@ def ship(
         place = Path(temporary) / "agent"
         place.mkdir()
         checkpoints.write_file(place / WEIGHTS, small)
-        single = evaluate(Player(str(run)), name, EPISODES)
+        single = evaluate(Player(str(run)), scenario, EPISODES)
         if plays is None:
             require_same(single, result["eval"])
-        half = evaluate(Player(str(place)), name, EPISODES)
+        half = evaluate(Player(str(place)), scenario, EPISODES)
         compared = result.get("half_precision") or {
             **compare(single.result.success, half.result.success),
             "identical": identical(single, half),
@@ -242,7 +246,8 @@ def index(folder: Path) -> str:
         name, result = file.parent.relative_to(folder).as_posix(), read_json(file)
         low, high = result["eval"]["success_interval"]
         rows.append(
-            f"| [`{name}`]({name}/README.md) | {result['eval']['success_rate']:.1%} | {low:.1%} to {high:.1%} "
+            f"| [`{name}`]({name}/README.md) | `{result['scenario']}` "
+            f"| {result['eval']['success_rate']:.1%} | {low:.1%} to {high:.1%} "
             f"| {result['frames']:,} | {result['recipe']} |"
         )
     return "\n".join(
@@ -255,8 +260,8 @@ def index(folder: Path) -> str:
             "its agent.",
             "`tools/ship_agent.py` makes this page and the folders.",
             "",
-            "| agent and scenario | success | 95 % interval | frames | recipe |",
-            "| --- | --- | --- | --- | --- |",
+            "| agent | scenario | success | 95 % interval | frames | recipe |",
+            "| --- | --- | --- | --- | --- | --- |",
             *rows,
             "",
         ]

@@ -19,8 +19,13 @@ def agents_folder() -> Path:
     return installed if installed.is_dir() else package.parent / "agents"
 
 
+def agent_name(scenario: str, *variants: str) -> str:
+    """The name under which the agent of a scenario ships, or of a variant of it: `talkitout_marked`."""
+    return "_".join([scenario, *variants])
+
+
 def shipped_agents() -> list[str]:
-    """The names of the agents that ship. Each is that of the scenario on which the agent was trained."""
+    """The names of the agents that ship, see `agent_name`."""
     folder = agents_folder()
     return sorted(file.parent.relative_to(folder).as_posix() for file in folder.rglob(WEIGHTS))
 

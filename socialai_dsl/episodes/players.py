@@ -29,7 +29,7 @@ from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.folder import CONFIG, agent_of
 from socialai_dsl.trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
-from socialai_dsl.trainer.shipped import PREFIX, located, shipped_agents
+from socialai_dsl.trainer.shipped import PREFIX, agent_name, located, shipped_agents
 
 SHIPPED: Final = "shipped"
 """The agent that ships for the scenario that is played."""
@@ -290,10 +290,10 @@ def named_agent(agent: str, scenario: str) -> str:
     if path.is_relative_to(shipped):
         base = path.relative_to(shipped).with_suffix("").as_posix()
         for count in range(len(variants), -1, -1):
-            name = "_".join([base, *variants[:count]])
+            name = agent_name(base, *variants[:count])
             if name in known:
                 return PREFIX + name
-    raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
+    raise UsageError(f"{scenario}: no agent ships for it; these agents ship: {', '.join(known)}")
 
 
 def is_name(agent: str) -> bool:
