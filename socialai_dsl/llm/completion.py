@@ -33,9 +33,9 @@ _STOPS: Final[dict[str, Stop]] = {
 }
 _MOST_TOKENS: Final = 10**12
 _LONGEST_REASON: Final = 80
-_EVENTS: Final = (b"data:", b"event:", b":")
+_EVENTS: Final = (b"data:", b"event:", b"id:", b"retry:", b":")
 """How a stream of events begins."""
-_DONE: Final = "[DONE]"
+_DONE: Final = b"[DONE]"
 """The last event."""
 
 
@@ -196,7 +196,7 @@ def read_completion(content: bytes) -> Completion | None:
 
     Some servers stream whatever they are asked: a stream that came to its end is put together.
     """
-    if content.startswith(_EVENTS):
+    if content.lstrip().startswith(_EVENTS):
         return _streamed(content)
     found = _json(content)
     try:
@@ -209,10 +209,10 @@ def read_completion(content: bytes) -> Completion | None:
 
 def _streamed(content: bytes) -> Completion | None:
     """The completion whose pieces are events; None if they are no pieces of one, or not all."""
-    lines = content.decode(errors="replace").splitlines()
-    data = [line.removeprefix("data:").strip() for line in lines if line.startswith("data:")]
+    # Bytes end lines as events do; a text would also end them at signs such as U+2028, which JSON can hold.
+    data = [line.removeprefix(b"data:").strip() for line in content.splitlines() if line.startswith(b"data:")]
     try:
-        chunks = [_Chunk.model_validate(_json(event.encode())) for event in data if event != _DONE]
+        chunks = [_Chunk.model_validate(_json(event)) for event in data if event != _DONE]
     except ValidationError:
         return None
     choices = [choice for chunk in chunks for choice in chunk.choices[:1]]

@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from socialai_dsl.llm.actions import ToolCall
@@ -104,6 +104,7 @@ COUNTED: dict[str, Any] = {"reason": "stop", "prompt_tokens": 3, "completion_tok
             Completion("left", reasoning="Hm, I", **COUNTED),
         ),
         (events({"refusal": "No"}, {"refusal": "."}), Completion("No.", stop="refusal", **COUNTED)),
+        *((begin + events({"content": "left"}), Completion("left", **COUNTED)) for begin in (b"id: 1\n", b"\r\n\n")),
         (
             events({"content": "Act"}, reason="length"),
             Completion("Act", stop="length", **{**COUNTED, "reason": "length"}),
@@ -121,6 +122,16 @@ COUNTED: dict[str, Any] = {"reason": "stop", "prompt_tokens": 3, "completion_tok
 )  # fmt: skip
 def test_a_stream_that_nobody_asked_for_is_put_together(content: bytes, expected: Completion | None) -> None:
     assert read_completion(content) == expected
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"])))
+@example("\u2028\u2029\x85\x1c")
+def test_a_stream_holds_any_text(text: str) -> None:
+    """Also signs that end lines of text, not of events: servers write them as they are."""
+    chunk = json.dumps({"choices": [{"delta": {"content": text}}]}, ensure_ascii=False)
+    found = read_completion(f"data: {chunk}\n\ndata: [DONE]\n\n".encode())
+    assert found is not None
+    assert found.text == text
 
 
 @pytest.mark.parametrize(
