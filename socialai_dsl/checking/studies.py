@@ -37,8 +37,11 @@ PICTURES: Final[Mapping[str, str]] = {
 }
 """The files that pages may show, by their endings, and what they are."""
 
-PICTURE: Final = re.compile(r"!\[([^\]\n]*)\]\(([^()\s]+)\)")
-"""A picture in Markdown."""
+_PICTURE: Final = re.compile(
+    r"!\[[^\[\]]*\]\(\s*(?:<([^<>\n]+)>|((?:[^()<>\s]|\([^()\s]*\))+))"
+    r"""(?:\s+(?:"[^"]*"|'[^']*'|\([^()]*\)))?\s*\)"""
+)
+"""A picture in Markdown: its name, in angle brackets if it has blanks, and perhaps a title."""
 
 
 @dataclass(frozen=True)
@@ -312,7 +315,7 @@ class _Check:
             except ScenarioError as error:
                 self._bag.error("S903", f"`{written}`: {error.diagnostics[0].message}", span)
                 return ""
-        for _, name in PICTURE.findall(text):
+        for name in map("".join, _PICTURE.findall(text)):
             shown = self._beside(name)
             if shown is None or Path(name).suffix.lower() not in PICTURES:
                 kinds = ", ".join(PICTURES)

@@ -44,6 +44,10 @@ class Screens:
         self._loaded, self._study = loaded, loaded.study
         self._arenas, self._journal, self._games = arenas, journal, games
         self._markdown = MarkdownIt("commonmark", {"html": False, "breaks": False})
+        # By their addresses in HTML, in which blanks and letters such as ä are escaped.
+        self._pictures = {
+            self._markdown.normalizeLink(name): number for number, name in enumerate(loaded.pictures)
+        }
 
     @property
     def _progress(self) -> Progress:
@@ -175,7 +179,10 @@ class Screens:
 
     def _html(self, text: str) -> str:
         """Markdown as HTML, in which tags are shown as they are written."""
-        made: str = self._markdown.render(text)
-        for number, name in enumerate(self._loaded.pictures):
-            made = made.replace(f'src="{name}"', f'src="/picture/{number}"')
+        found = self._markdown.parse(text)
+        for piece in (inner for token in found for inner in token.children or () if inner.type == "image"):
+            number = self._pictures.get(str(piece.attrs["src"]))
+            if number is not None:
+                piece.attrs["src"] = f"/picture/{number}"
+        made: str = self._markdown.renderer.render(found, self._markdown.options, {})
         return made

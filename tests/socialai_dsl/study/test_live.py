@@ -56,6 +56,38 @@ async def play_on(one: Taking, rng: random.Random, most: int = 10_000) -> None:
             await one.go()
 
 
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("room.png", "{}"),
+        ("räume-1.png", "{}"),
+        ("a&b's.png", "{}"),
+        ("room(1).png", "{}"),
+        ("two rooms.png", "<{}>"),
+        ("room.png", '{} "A room"'),
+        ("room.png", "<{}> 'A room'"),
+    ],
+)
+def test_a_page_shows_its_pictures_however_they_are_called(name: str, written: str, tmp_path: Path) -> None:
+    page = f"![a room]({written.format(name)})"
+    (tmp_path / "walk.md").write_text(page, encoding="utf-8")
+    text = ALONE.replace("[Walk.]", "[walk.md]")
+    with pytest.raises(ScenarioError, match="S903"):
+        loaded_study(text, tmp_path)
+    (tmp_path / name).write_bytes(b"picture")
+    study = loaded_study(text, tmp_path)
+    assert [file.name for file in study.pictures.values()] == [name]
+
+    async def walk() -> None:
+        live = Live(study, tmp_path)
+        one = await newcomer(live)
+        await one.go()
+        assert 'src="/picture/0"' in one.now["html"]
+        await live.close()
+
+    run(walk)
+
+
 def steps(folder: Path) -> list[tuple[Any, ...]]:
     return [(e["game"], e["episode"], e["t"]) for e in read_log(folder / FILE) if e["event"] == "step"]
 
