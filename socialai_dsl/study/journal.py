@@ -9,7 +9,7 @@ from typing import Any
 from socialai_dsl.checking.studies import LoadedStudy, block_name
 from socialai_dsl.errors import UsageError
 from socialai_dsl.study.arena import Arena
-from socialai_dsl.study.log import FILE, Event, Log, read_log
+from socialai_dsl.study.log import FILE, Event, Log, follow
 from socialai_dsl.study.progress import Progress
 from socialai_dsl.study.replay import header_of, study_file
 
@@ -49,12 +49,16 @@ class Journal:
     def read(self) -> int:
         """Be where the log says; how many events it has."""
         self.progress, count = Progress(self._loaded), 0
-        for event in read_log(self._file):
+
+        def take(event: Event) -> None:
+            nonlocal count
             if event["event"] == "study":
                 self._check(event)
             self.spent = event.get("spent", self.spent)
             self.progress.apply(event)
             count += 1
+
+        follow(self._file, take)
         return count
 
     def _check(self, event: Event) -> None:

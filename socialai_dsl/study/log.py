@@ -6,12 +6,12 @@ import asyncio
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.errors import UnreadableError
+from socialai_dsl.errors import UnreadableError, UsageError
 
 FORMAT: Final = "socialai-study/1"
 FILE: Final = "log.jsonl"
@@ -37,6 +37,24 @@ def read_log(file: Path) -> Iterator[Event]:
             if not isinstance(event, dict) or (number == 1 and event.get("format") != FORMAT):
                 raise UnreadableError(f"{file}:{number}: expected an event of a log of the format {FORMAT}")
             yield event
+
+
+def follow(file: Path, take: Callable[[Event], None]) -> None:
+    """Let each event of a log be taken, in order.
+
+    Raises:
+        OSError, UnreadableError: see `read_log`; or an event cannot have come where it stands.
+        UsageError: `take` says that the log is of something else.
+    """
+    for number, event in enumerate(read_log(file), start=1):
+        try:
+            take(event)
+        except UsageError:
+            raise
+        except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+            raise UnreadableError(
+                f"{file}:{number}: the event {event.get('event')!r} cannot have come here: {error}"
+            ) from None
 
 
 class Log:

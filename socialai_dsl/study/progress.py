@@ -140,8 +140,8 @@ class Progress:
     def rooms(self, game: Game) -> tuple[int, ...]:
         """The rooms that a game plays, in this order; of practice those of the present round."""
         study = self.study
-        first = next(who for who in game.seats.values() if who in self.people)
-        person = self.people[first]
+        person = next((self.people[who] for who in game.seats.values() if who in self.people), None)
+        assert person is not None, "internal: a participant plays"
         if game.block == PRACTICE:
             assert study.practice is not None, "internal: there is practice"
             start = PRACTICE_SEED + person.rounds * study.practice.episodes

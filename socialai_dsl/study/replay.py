@@ -17,13 +17,13 @@ from socialai_dsl.checking.briefing import Tell
 from socialai_dsl.checking.studies import PRACTICE, LoadedStudy, block_name, rival_of_agent, scripts_agent
 from socialai_dsl.envs.factory import compiled
 from socialai_dsl.episodes.asking import Asking
-from socialai_dsl.errors import UnreadableError, UsageError
+from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.schema.study import PERSON, Question
 from socialai_dsl.study.arena import Arena, Episode
 from socialai_dsl.study.columns import COLUMNS
-from socialai_dsl.study.log import FILE, FORMAT, Event, read_log
+from socialai_dsl.study.log import FILE, FORMAT, Event, follow, read_log
 from socialai_dsl.study.progress import Game, Participant, Progress, done_on
 from socialai_dsl.traces.endings import Ending, endings_of
 
@@ -126,15 +126,7 @@ class _Tables:
         self._server, self._replayed, self._simulated, self._begun = 0, 0, False, ""
 
     def made(self) -> StudyData:
-        for number, event in enumerate(read_log(self._file), start=1):
-            try:
-                self._take(event)
-            except (KeyError, ValueError, AssertionError) as error:
-                if isinstance(error, UsageError):
-                    raise
-                raise UnreadableError(
-                    f"{self._file}:{number}: the event {event.get('event')!r} cannot have come here: {error}"
-                ) from None
+        follow(self._file, self._take)
         for person in self._progress.people.values():
             self._rows["participants"].append(self._participant(person))
         tables = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from socialai_dsl.checking.studies import LoadedStudy
-from socialai_dsl.study.log import FILE, read_log
+from socialai_dsl.study.log import FILE, Event, follow
 from socialai_dsl.study.progress import Progress
 
 
@@ -42,10 +42,14 @@ def status_of(loaded: LoadedStudy, folder: Path) -> Status:
         OSError, UnreadableError: its log cannot be read.
     """
     progress, latest, simulated = Progress(loaded), "", False
-    for event in read_log(folder / FILE):
+
+    def take(event: Event) -> None:
+        nonlocal latest, simulated
         progress.apply(event)
         latest = event["time"]
         simulated = simulated or (event["event"] == "study" and bool(event.get("simulated")))
+
+    follow(folder / FILE, take)
     people = list(progress.people.values())
     began = [person for person in people if person.group is not None]
     finished = [person for person in began if person.ended is not None]

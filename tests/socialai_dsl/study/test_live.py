@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.checking.studies import LoadedStudy
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.frontend import load_study
@@ -376,6 +377,32 @@ def test_data_that_do_not_reproduce_are_refused(
     (tmp_path / FILE).write_bytes(whole.replace(old.encode(), new.encode(), 1))
     with pytest.raises(UnreadableError, match=why):
         study_data(loaded_study(ALONE, place), tmp_path)
+
+
+@pytest.mark.parametrize("value", [None, "p9", []])
+def test_whoever_reads_a_log_that_was_changed_says_in_which_line(
+    value: Any, whole: bytes, place: Path, tmp_path: Path
+) -> None:
+    """Or notices nothing, where it does not need what was changed."""
+
+    def go_on(loaded: LoadedStudy, folder: Path) -> None:
+        run(Live(loaded, folder).close)
+
+    loaded, lines = loaded_study(ALONE, place), whole.splitlines()
+    refused: dict[str, list[str]] = {}
+    first = {json.loads(line)["event"]: number for number, line in reversed([*enumerate(lines)])}
+    for number in first.values():
+        event = json.loads(lines[number])
+        for one in [{}] if value is None else [{**event, key: value} for key in event]:
+            new = [*lines[:number], json.dumps(one).encode(), *lines[number + 1 :]]
+            (tmp_path / FILE).write_bytes(b"\n".join(new) + b"\n")
+            for name, reads in (("data", study_data), ("status", status_of), ("run", go_on)):
+                try:
+                    reads(loaded, tmp_path)
+                except UsageError as error:
+                    refused.setdefault(name, []).append(str(error))
+    assert all(f"{FILE}:" in said for told in refused.values() for said in told)
+    assert min(len(refused[name]) for name in ("data", "status", "run")) >= len(first) // 2
 
 
 def test_tables_are_written_with_a_codebook(whole: bytes, place: Path, tmp_path: Path) -> None:
