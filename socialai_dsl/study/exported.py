@@ -25,6 +25,8 @@ FORMAT: Final = "socialai-study-data/1"
 TABLES: Final = "data"
 _AGAIN: Final = "write it again with `socialai study data`"
 
+_LONGEST: Final = 2**31 - 1
+"""Characters of a field; by default csv refuses some replies of language models."""
 _AS: Final[Mapping[str, Callable[[str], Any]]] = {
     "bool": lambda text: {"True": True, "False": False}[text],
     "int": int,
@@ -114,6 +116,7 @@ def _table(folder: Path, study: str, name: str, about: Mapping[str, Any]) -> lis
     if _digest(file) != about["sha256"]:
         raise UnreadableError(f"{file}: was changed since it was written, so it cannot be believed; {_AGAIN}")
     kinds = about["columns"]
+    csv.field_size_limit(_LONGEST)
     with open(file, encoding="utf-8", newline="") as stream:
         return [
             {key: _AS[kinds[key]](text) if text else text for key, text in row.items()} | _scale(row)

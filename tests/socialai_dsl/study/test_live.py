@@ -23,6 +23,7 @@ from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.study import log
 from socialai_dsl.study.columns import COLUMNS
 from socialai_dsl.study.data import write_data
+from socialai_dsl.study.exported import read_exported
 from socialai_dsl.study.live import FAST, TAKEN, Live
 from socialai_dsl.study.log import FILE, Log, read_log
 from socialai_dsl.study.replay import StudyData, study_data
@@ -417,6 +418,21 @@ def test_tables_are_written_with_a_codebook(whole: bytes, place: Path, tmp_path:
         one["name"] for one in described["variableMeasured"]
     }
     assert "| `hard` | scale | How hard? |" in (tmp_path / "out" / "codebook.md").read_text()
+
+
+@pytest.mark.parametrize(
+    "text", ["x" * 200_000, 'a,"b"', "=1+1", "1", "True", "\r", "two\r\nlines\n", "\x00", "\ufeff", "ä\u2028"]
+)
+def test_tables_are_read_again_as_they_were_written(
+    text: str, whole: bytes, place: Path, tmp_path: Path
+) -> None:
+    """Whatever people have answered, and however much a language model."""
+    (tmp_path / FILE).write_bytes(whole)
+    loaded = loaded_study(ALONE, place)
+    data = study_data(loaded, tmp_path)
+    data.tables["steps"][0]["reply"] = data.tables["answers"][0]["answer"] = text
+    write_data(data, loaded, tmp_path / "out")
+    assert read_exported(tmp_path / "out").tables == data.tables
 
 
 # -- two people ----------------------------------------------------------------------------------------------------
