@@ -62,12 +62,12 @@ def read_journal(file: Path) -> list[dict[str, Any]]:
         ValueError: it is none of ours.
     """
     events: list[dict[str, Any]] = []
-    for line in file.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True):
+    for line in file.read_bytes().split(b"\n")[:-1]:
         try:
             event = json.loads(line)
         except ValueError:
             break
-        if not line.endswith("\n") or not isinstance(event, dict):
+        if not isinstance(event, dict):
             break
         events.append(event)
     if not events or events[0].get("format") != FORMAT:

@@ -29,6 +29,7 @@ from socialai_dsl.envs.view import ahead
 from socialai_dsl.episodes.policies import RandomPolicy, ReplayedPolicy
 from socialai_dsl.evaluation.people import play_seed
 from socialai_dsl.play.game import Game, Sight, finished_episodes
+from socialai_dsl.play.journal import Journal, read_journal
 from socialai_dsl.play.screen import PlayApp
 
 BARE = """\
@@ -526,6 +527,17 @@ def test_another_seat_is_played_and_the_journal_is_replayed_to_the_same_bits(
     assert said == [f"Ann: {line.text}" for line in heard if line.speaker == "Ann"]
     ended = info["outcome"], info["success"], len(read.actions)
     assert ended == (last["outcome"], last["success"], last["steps"]) == ("success@12", True, 9)
+
+
+@pytest.mark.parametrize("told", ["Leave.\u2028Be quick.", "\x85\u2029", "a\nb\r\n", "ä"])
+def test_a_journal_is_read_again_whatever_was_told(told: str, tmp_path: Path) -> None:
+    """Also signs that end lines of text, which JSON may hold as they are."""
+    file = tmp_path / "played.jsonl"
+    with Journal(file, {"told": told}) as journal:
+        journal.note("episode", title=told)
+    with open(file, "a", encoding="utf-8") as cut_off:
+        cut_off.write('{"event": "step", "t": 1')
+    assert [event.get("told", event.get("title")) for event in read_journal(file)] == [told, told]
 
 
 @pytest.mark.parametrize(
