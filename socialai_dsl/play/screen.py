@@ -391,7 +391,7 @@ class _Chooser(ModalScreen[str | None]):
     _Chooser { align: center middle; }
     #box { width: 72; max-width: 95%; height: auto; max-height: 20; border: round $primary; background: $surface; }
     #lists { height: auto; max-height: 15; }
-    OptionList { width: 1fr; height: auto; max-height: 15; }
+    OptionList { width: 1fr; min-width: 12; height: auto; max-height: 15; }
     #sentence { padding: 0 1; text-style: bold; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [

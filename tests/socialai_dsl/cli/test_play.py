@@ -261,14 +261,15 @@ def played(
     practice: bool = True,
     episodes: Any = episode,
     view: Sight = "room",
+    size: tuple[int, int] = (COLUMNS, ROWS),
 ) -> PlayApp:
-    """Let a function play on a screen of 80x24."""
+    """Let a function play on a screen of 80x24, or of another size."""
     game = Game(scenario)
     game.begin(*episodes(0))
     app = PlayApp(game, episodes, practice, view)
 
     async def run() -> None:
-        async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        async with app.run_test(size=size) as pilot:
             await player(app, pilot)
 
     asyncio.run(run())
@@ -310,6 +311,15 @@ def test_keys_lists_and_lines() -> None:
         assert app._game.steps == 7
 
     played("talkitout", play)
+
+
+@pytest.mark.parametrize("columns", [1, 5, 10])
+def test_lists_are_shown_in_a_terminal_of_any_width(columns: int) -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        await pilot.press("c", "down", "down", "enter", "enter")
+        assert app._game.steps == 1
+
+    played("talkitout", play, size=(columns, ROWS))
 
 
 @pytest.mark.thorough("plays in a terminal")
