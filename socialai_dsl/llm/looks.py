@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Container, Mapping, Sequence
 from typing import Any, Final
 
@@ -33,7 +34,7 @@ Cell = tuple[int, ...]
 
 
 def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
-    """Status code in the picture -> the kind of NPC that looks so; codes of several kinds are left out."""
+    """Status code in the picture -> the kind of NPC that looks so, where either has only the other."""
     words: dict[int, set[str]] = {}
     for program in programs:
         codes = program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].tolist()
@@ -42,7 +43,8 @@ def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
                 words.setdefault(code, set()).add(entity.type)
     # What an NPC with a drawn kind looks like is one of several codes, of which the program holds the greatest.
     alike = {code: kinds.pop() for code, kinds in words.items() if len(kinds) == 1}
-    return {code: kind for code, kind in alike.items() if " or " not in kind}
+    codes = Counter(alike.values())
+    return {code: kind for code, kind in alike.items() if codes[kind] == 1 and " or " not in kind}
 
 
 def directions_at(ahead: int, right: int, directions: tuple[str, ...]) -> tuple[str, ...]:

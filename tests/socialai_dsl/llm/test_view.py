@@ -239,3 +239,22 @@ def test_looks_are_told_of() -> None:
     assert "peer, mood angry, facing south" in text
     told = json.loads(TextView(sd.compile(sd.load(name)), "json").observe(observation, info))
     assert told["carrying"]["looks"] == {"size": "small", "pattern": "striped"}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_people_who_look_different_are_told_apart(style: Style, tmp_path: Path) -> None:
+    """Also where they are of one kind, and each has a code of its own in the picture."""
+    texts = set[str]()
+    for kind in ("{kind: guide}", "{kind: guide, kind_code: 5}", "{kind: wizard}"):
+        play = Folder(tmp_path)(
+            f"""\
+            cast:
+              ann: {{at: [5, 5], kind: guide}}
+              bob: {{at: [4, 5], kind: guide, kind_code: 5}}
+              carl: {{at: [3, 5], kind: wizard}}
+              dora: {{at: [3, 1], facing: left, color: red, {kind[1:]}
+            """
+        )
+        program = play.env.unwrapped.program  # type: ignore[attr-defined]
+        texts.add(TextView(program, style).observe(play.observation, play.info))
+    assert len(texts) == 3
