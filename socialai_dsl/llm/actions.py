@@ -300,7 +300,7 @@ class ActionLanguage:
         quoted = [
             (found, self._sentence(text))
             for found, text in quotations
-            if tuple(words(text)) not in self._movements
+            if tuple(words(text)) not in self._movements or _says(content[: found.start()])
         ]
         if any(sentence is not None for _, sentence in quoted):
             return self._with_quotations(content, quoted)
@@ -438,6 +438,11 @@ def _object(text: str) -> Any:
         return json.loads(text, object_pairs_hook=plain)
     except (ValueError, RecursionError):
         return None
+
+
+def _says(before: str) -> bool:
+    """Whether what stands before a quotation makes it a sentence, whatever it is otherwise."""
+    return not _SAYING.isdisjoint(words(before)[-1:])
 
 
 def _without_fillers(said: Sequence[str]) -> list[str]:

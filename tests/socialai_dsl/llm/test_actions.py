@@ -13,6 +13,7 @@ import socialai_dsl as sd
 from socialai_dsl.llm import Action, ActionLanguage
 from socialai_dsl.llm.actions import ToolCall
 from socialai_dsl.llm.questions import read_answer
+from socialai_dsl.program_suite import Playable
 from tests.shipped import scenarios, suites
 from tests.tiny import Folder
 
@@ -173,7 +174,31 @@ def test_what_is_not_understood_is_answered_with_what_is_possible(reply: str, wr
 
 @pytest.mark.parametrize("name", [*scenarios(), *suites()])
 def test_everything_that_can_be_done_and_said_is_read_back(name: str) -> None:
-    program = sd.compile(sd.load(name))
+    reads_back(sd.compile(sd.load(name)))
+
+
+def test_so_is_what_looks_like_something_else(tmp_path: Path) -> None:
+    play = Folder(tmp_path)(
+        """\
+        actions: [left, right, forward, done]
+        grammar:
+          templates:
+          - <noun>
+          - Say <noun>
+          - He said "hi" to <noun>
+          - "Act: left, <noun>"
+          - "* <noun> *"
+          - "I am done, <noun>"
+          - Yes or <noun>, please
+          - "{<noun>}"
+          nouns: [left, none, nothing, stay, silence, or, I, O'Neil, "a: b", 1, forward now]
+        """
+    )
+    reads_back(play.env.unwrapped.program)  # type: ignore[attr-defined]
+
+
+def reads_back(program: Playable) -> None:
+    """See that replies that say what can be done and said are read so."""
     language = ActionLanguage(program)
     schema = jsonschema.Draft202012Validator(language.json_schema())
     for template, choices in program.sentences.each():
