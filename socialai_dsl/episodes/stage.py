@@ -83,16 +83,15 @@ class Stage(Rooms):
         partners: policies that play other seats in it.
 
     Attributes:
-        moments: the start, and one for each step.
+        moments: the start, and one for each step; none before an episode has begun.
     """
-
-    moments: list[StageMoment]
 
     def __init__(
         self, env: Any, observers: Sequence[Observer] = (), partners: Iterable[Remembering] = ()
     ) -> None:
         super().__init__(env, observers)
         self._partners = tuple(partners)
+        self.moments: list[StageMoment] = []
 
     def begin(
         self, reset: Mapping[str, Any], numbers: Int64 | None = None, begun: Bools | None = None

@@ -175,7 +175,7 @@ class Session:
             raise RefusalError("there is no scenario yet")
         if casting != self._casting:
             self._use(load(f"{self._scenario}{casting.variant}", self._texts), casting)
-        stage, tracing = self._playing()
+        stage, tracing = self._made()
         self._let_sit(_NO_ACTS)
         tracing.title, tracing.tracer.players = _title(room), dict(self._words)
         try:
@@ -375,6 +375,8 @@ class Session:
             return {"suite": suite_text(name, self._scenario.name, layout), "name": f"{name}.yaml"}
         if loaded.suite.members is None or loaded.suite.sweep is not None or loaded.in_sequence:
             raise RefusalError("members that are acts or made by a tree or sweep get their layouts by hand")
+        if described.get("member") not in loaded.member_names:
+            raise RefusalError("what is played is no member of this suite; begin the episode again first")
         suite = loaded.resolved.tree
         entry = suite.at(("members", loaded.member_names.index(described["member"])))
         if any(part.file != suite.file for _, part in entry.walk()):
@@ -487,10 +489,18 @@ class Session:
         except ScenarioError:  # the variant with it has mistakes, which are told where it is opened
             return False
 
-    def _playing(self) -> tuple[Stage, Tracing]:
+    def _made(self) -> tuple[Stage, Tracing]:
+        """What episodes are played in."""
         if self._game is None:
             raise RefusalError("there is no room yet; the scenario has mistakes")
         return self._game
+
+    def _playing(self) -> tuple[Stage, Tracing]:
+        """The same, in which an episode has begun."""
+        stage, tracing = self._made()
+        if not stage.moments:
+            raise RefusalError("there is no room yet; the one that was asked for cannot be")
+        return stage, tracing
 
     def _encoded(self, movement: str | None, sentence: str | None, line: str | None) -> NDArray[np.int64]:
         """The action that words mean, int64 (heads,). Raises RefusalError, which says what was probably meant."""
@@ -506,7 +516,7 @@ class Session:
 
     def _let_sit(self, acts: Acts) -> None:
         """Let those on other seats do this in the next step, and where nothing is said whoever stands in do it."""
-        stage, tracing = self._playing()
+        stage, tracing = self._made()
         for seat, stand_in in (self._filled or {}).items():
             if seat in acts:
                 stage.env.fill_seat(seat, _InPlaceOf(stand_in, acts[seat]))

@@ -74,7 +74,7 @@ def test_a_page_finds_the_directions_of_the_observation_again(name: str) -> None
     """In its picture directions are turned as on a screen; `observed` of the page turns them back."""
     session = Session()
     session._use(sd.load(name), Casting())
-    stage, tracing = session._playing()
+    stage, tracing = session._made()
     stage.begin({"seed": 0})
     random, looks = np.random.default_rng(0), list[list[int]]()
     for _ in range(40):
@@ -326,6 +326,36 @@ def test_a_mistake_in_another_file_is_told_with_its_place(tmp_path: Path) -> Non
     refused = json.loads(desk.answer(json.dumps(begin)))["refused"]
     assert "shy_oracle.yaml:" in refused
     assert "S201" in refused
+
+
+def test_where_a_room_cannot_be_everything_else_is_refused_until_another_begins(
+    session: Session, path: Path
+) -> None:
+    text = path.read_text()
+    drawn = session.draw(str(path), text, Room(layout={"nobody": {"at": [1, 1]}}))
+    assert "nobody" in drawn["refused"]
+    for ask in (
+        lambda: session.act("left"),
+        lambda: session.choose("left"),
+        session.auto,
+        lambda: session.back(0),
+        lambda: session.place("wizard", (1, 1)),
+        lambda: session.look("wizard"),
+        lambda: session.glance("wizard"),
+        session.layout,
+        lambda: session.write_layout(text),
+        session.replay,
+        lambda: session.write_test("mine"),
+    ):
+        with pytest.raises(RefusalError, match="there is no room yet"):
+            ask()
+    session.begin(Room(seed=3))
+    assert session.act("left")["more"]["moments"][0]["did"] == "left"
+
+
+def test_a_layout_is_written_for_a_member_that_there_is(session: Session) -> None:
+    with pytest.raises(RefusalError, match="what is played is no member of this suite"):
+        session.write_layout("suite: both\nmembers: [dance, help]\n")
 
 
 def test_an_episode_begins_again_where_it_began(session: Session) -> None:
