@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import secrets
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
@@ -56,6 +57,10 @@ _SESSION: Final = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
 """This process, in every reply that it writes down."""
 _SHOWN: Final = 4000
 """The most characters of a reply that the model is shown again, the last ones without its thoughts."""
+
+_NO_NAME: Final = re.compile(r"[^a-zA-Z0-9_-]")
+_LONGEST_NAME: Final = 64
+"""What names of tools are, as OpenAI's interface takes them."""
 
 
 @dataclass(frozen=True)
@@ -792,16 +797,21 @@ def _exchange(text: str, reply: str, calls: list[ToolCall], turn: Turn) -> list[
     if not calls:
         return [asked, {"role": "assistant", "content": reply or "(nothing)"}]
     named = [
-        {
-            "id": f"call{n}",
-            "type": "function",
-            "function": {"name": call.name[:_SHOWN], "arguments": call.arguments[:_SHOWN]},
-        }
-        for n, call in enumerate(calls)
+        {"id": f"call{n}", "type": "function", "function": _repeated(call)} for n, call in enumerate(calls)
     ]
     told = "not understood" if turn.error else "done"
     answers = [{"role": "tool", "tool_call_id": call["id"], "content": told} for call in named]
     return [asked, {"role": "assistant", "content": reply or None, "tool_calls": named}, *answers]
+
+
+def _repeated(call: ToolCall) -> dict[str, str]:
+    """A call as a message has it: servers refuse a conversation with other names, or arguments that are no object."""
+    try:
+        fits = len(call.arguments) <= _SHOWN and isinstance(json.loads(call.arguments), dict)
+    except (ValueError, RecursionError):
+        fits = False
+    name = _NO_NAME.sub("_", call.name)[:_LONGEST_NAME] or "_"
+    return {"name": name, "arguments": call.arguments if fits else "{}"}
 
 
 def _records(path: Path) -> Iterator[dict[str, Any]]:

@@ -228,6 +228,37 @@ def test_json_and_tools(tmp_path: Path) -> None:
     assert stub.requests[0]["grammar"].startswith('root ::= "Act: "')
 
 
+def test_calls_that_are_none_are_repeated_as_servers_take_them(tmp_path: Path) -> None:
+    """Servers refuse a conversation in which a tool has no name, or arguments that are no object."""
+    given: Any = [
+        ("move", '{"direction": "le'),
+        ("move", '["left"]'),
+        ("move", json.dumps({"direction": "left " * 2000})),
+        ("", "{}"),
+        ("functions.move <|x|>" * 9, '{"direction": "left"}'),
+        ("move", '{"direction": "left"}'),
+    ]
+
+    def answer(request: dict[str, Any]) -> Any:
+        said = [call["function"] for m in request["messages"] for call in m.get("tool_calls", ())]
+        for one in said:
+            if not re.fullmatch("[a-zA-Z0-9_-]{1,64}", one["name"]) or not isinstance(parsed(one), dict):
+                return 400, {}, b'{"error": {"message": "no call of a tool"}}'
+        name, arguments = given[min(len(said), len(given) - 1)]
+        call = {"id": "7", "type": "function", "function": {"name": name, "arguments": arguments}}
+        return {"role": "assistant", "content": None, "tool_calls": [call]}
+
+    def parsed(call: dict[str, Any]) -> Any:
+        try:
+            return json.loads(call["arguments"])
+        except ValueError:
+            return None
+
+    with endpoint(answer) as stub:
+        assert evaluate(stub.url, tmp_path, "--mode", "tools", episodes=1) == 0
+    assert figures(tmp_path)["eval"]["invalid_replies"] == len(given) - 1
+
+
 FAULTS: dict[str, Any] = {
     "rate limit": (429, {"Retry-After": "0.01"}, b'{"error": {"message": "slow down"}}'),
     "server error": (500, {}, b"Internal Server Error"),
