@@ -84,13 +84,16 @@ class EvalResult:
         return len(self.success)
 
     def by_trial(self, trials: int) -> list[tuple[int, int]]:
-        """Successes and episodes of each trial.
+        """Successes and episodes of each trial that was played.
 
         Args:
             trials: how many a session has; episode n is trial n modulo `trials`.
         """
         order = np.arange(self.episodes) % trials
-        return [(int(self.success[order == t].sum()), int((order == t).sum())) for t in range(trials)]
+        return [
+            (int(self.success[order == t].sum()), int((order == t).sum()))
+            for t in range(min(trials, self.episodes))
+        ]
 
     @property
     def success_rate(self) -> float:

@@ -99,6 +99,12 @@ def test_players_remember_a_session_unless_asked_otherwise() -> None:
     assert found == {None: (4, 3, [4, 3, 3]), 1: (10, 1, []), 5: (2, 5, [2] * 5)}
 
 
+@pytest.mark.parametrize("episodes", [1, 2, 4])
+def test_fewer_episodes_than_a_session_has_are_told_by_the_trials_that_there_were(episodes: int) -> None:
+    figures = sd.evaluate("random", str(BOXES), episodes).figures()
+    assert [one["episodes"] for one in figures["trials"]] == {1: [1], 2: [1, 1], 4: [2, 1, 1]}[episodes]
+
+
 def test_rooms_of_a_seed_are_first_episodes_and_therefore_refused() -> None:
     with pytest.raises(
         OptionError, match="got seed:3, but sessions has sessions, which the test set alone has"
