@@ -89,7 +89,9 @@ class ScenarioParallelEnv(Copied, ParallelEnv[str, Observation, NDArray[np.int64
         """
         seed = None if seed is None else whole_number("seed", seed, 0, MAX_SEED)
         self._table.reset(seed, None if options == _ASKED_BY_TESTS else options)
-        self.agents = list(self.possible_agents)
+        # Still so where `reset_mask` is False.
+        plays = self._table.all_begun and not self._table.state.registers[0, Register.ENDED]
+        self.agents = list(self.possible_agents) if plays else []
         if self.render_mode == "human":
             self.render()
         return self._observations(), self._infos()

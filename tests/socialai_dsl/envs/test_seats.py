@@ -358,6 +358,27 @@ def test_a_parallel_environment_is_what_a_batch_is(two: str) -> None:
         env.step({})
 
 
+def test_a_reset_of_no_game_begins_none_in_a_parallel_environment(two: str) -> None:
+    """As in a single environment: an episode that has ended, or that there is not yet, cannot be played."""
+    nobody = {"reset_mask": [False]}
+    env, alone = sd.make_parallel(two), sd.make(two)
+    done = np.array([7, 0, 0, 0])
+    for steps in (0, 2, 6):
+        for one in (env, alone) if steps else ():
+            one.reset(seed=1)
+        for _ in range(steps):
+            env.step(dict.fromkeys(env.possible_agents, done))
+            alone.step(done)
+        env.reset(options=nobody)
+        alone.reset(options=nobody)
+        assert env.agents == (env.possible_agents if steps == 2 else [])
+        if steps != 2:
+            with pytest.raises(ValueError, match="outside of an episode"):
+                env.step(dict.fromkeys(env.possible_agents, done))
+            with pytest.raises(ValueError, match="outside of an episode"):
+                alone.step(done)
+
+
 def test_a_parallel_environment_asks_for_all_actions(two: str) -> None:
     env = sd.make_parallel(two)
     env.reset(seed=0)
