@@ -231,6 +231,14 @@ class Session:
         """The policies on other seats, by the names that their states have in a checkpoint."""
         return [(f"partners.{name}", policy) for name, policy in _partners_in(self.envs).items()]
 
+    def begin_update(self) -> None:
+        """Let partners go on from their states, as they do in a resumed run.
+
+        What they keep besides, such as features of earlier frames, decides how later ones are rounded.
+        """
+        for _, partner in self._partners():
+            partner.load_state(partner.state())
+
     def _parts_in_json(self) -> list[tuple[str, Curriculum | Guide]]:
         """Curriculum and guide, if there are any, by the names that their states have in a checkpoint."""
         parts = (("curriculum", getattr(self.tutor, "curriculum", None)), ("guide", self.guide))

@@ -112,6 +112,7 @@ def train(
             session.save(run_dir)
         metrics = Metrics(session)
         while session.update < config.updates and not stop():
+            session.begin_update()
             played = algorithm.collect()
             tally = _tally(played)
             figures = _figures(algorithm.update(played))

@@ -260,6 +260,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         seed = None if seed is None else whole_number("seed", seed, 0, MAX_SEED)
+        before = None if self._company is None else self._company.playing
         self._table.reset(seed, options)
         super().reset(seed=seed)
         # Still so where `reset_mask` is False.
@@ -269,8 +270,8 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             self.render()
         self._look_up()
         self._record()
-        if self._company is not None:
-            self._company.begin(self._table.batch.ports.chosen.copy())
+        if self._company is not None and before is not None:
+            self._company.begin(self._table.batch.ports.chosen.copy(), before)
         return self._observation(), {"utterance": SILENCE, "history": self._history, **self._always}
 
     def step(
@@ -492,7 +493,10 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._explainers[program.sha256].explain(recording, reached)
 
     def snapshot(self) -> bytes:
-        """The exact state as bytes, randomness included."""
+        """The exact state as bytes, randomness included.
+
+        What policies on other seats remember is not part of it; a copy of the environment has that, too.
+        """
         return self._table.snapshot()
 
     def restore(self, data: bytes) -> None:

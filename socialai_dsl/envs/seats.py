@@ -177,7 +177,6 @@ class Company:
         self._partners: dict[int, tuple[Any, ...]] = {}
         self._sizes = table.merged.action_space().nvec.astype(np.uint64)
         self._sites = [np.uint64(draws.site(f"seats.{name}")) for name in seats.names]
-        self._begun = np.zeros((table.rows, Key.KEY), np.uint64)  # seed, index and episode of each game
         self._sit(dict(seats.partners))
 
     @property
@@ -220,15 +219,19 @@ class Company:
             taken[games, number] = not number or not _is(player, SCRIPT)
         self._table.set_taken(taken.reshape(-1))
 
-    def begin(self, begun: NDArray[np.bool_]) -> None:
-        """Episodes have begun in some games, bool (E,)."""
+    @property
+    def playing(self) -> NDArray[np.uint64]:
+        """Seed, index and episode of each game, uint64 (E, 3), copied."""
+        return self._table.state.keys[:, : Key.KEY].copy()
+
+    def begin(self, begun: NDArray[np.bool_], before: NDArray[np.uint64]) -> None:
+        """Episodes have begun in some games, bool (E,), after those that were `playing` before."""
         if not begun.any():
             return
-        now = self._table.state.keys[:, : Key.KEY]
-        follows = (now - self._begun == np.array([0, 0, 1], np.uint64)).all(1)
+        now = self.playing
+        follows = (now - before == np.array([0, 0, 1], np.uint64)).all(1)
         enters = begun & follows & (now[:, Key.EPISODE] % self._table.sessions != 0)
         forgets = begun & ~enters
-        self._begun[begun] = now[begun]
         for _, games, player in self._filled():
             if isinstance(player, str):
                 continue

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from socialai_dsl.diagnostics import suggested
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.copying import Copied
 from socialai_dsl.envs.options import check_render_mode
 from socialai_dsl.envs.picture import frame
@@ -181,11 +180,12 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             ValueError: a seed, an option or a layout is not what was expected, or says nothing beside another.
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
+        before = None if self._company is None else self._company.playing
         self._table.reset(seed, options)
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
-        if self._company is not None:
-            self._company.begin(self._table.batch.ports.chosen.copy())
+        if self._company is not None and before is not None:
+            self._company.begin(self._table.batch.ports.chosen.copy(), before)
         return self._observation(), {}
 
     def step(
@@ -216,9 +216,9 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             return self._table.step(self._task, actions)
         self._table.look("step")
         own = self._table.own_actions(actions, self.num_envs)
-        before = self._table.state.keys[:, Key.EPISODE].copy()
+        before = self._company.playing
         ended = self._table.step(self._task, self._company.act(own))
-        self._company.begin(self._table.state.keys[:, Key.EPISODE] != before)
+        self._company.begin((self._company.playing != before).any(1), before)
         return ended
 
     def _observation(self) -> Observation:
@@ -394,7 +394,10 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
         return {name: sum(a.nbytes for a in parts) // self.num_envs for name, parts in arrays.items()}
 
     def snapshot(self) -> bytes:
-        """The exact state of all environments as bytes, randomness included."""
+        """The exact state of all environments as bytes, randomness included.
+
+        What policies on other seats remember is not part of it; a copy of the environments has that, too.
+        """
         return self._table.snapshot()
 
     def restore(self, data: bytes) -> None:

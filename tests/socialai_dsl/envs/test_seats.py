@@ -179,6 +179,35 @@ def test_a_policy_in_many_games_remembers_the_session_of_each(
         assert told == (["forgets", "enters", "enters"] * len(told))[: len(told)]
 
 
+@pytest.mark.parametrize("many", [True, False])
+def test_a_policy_remembers_the_session_in_whose_middle_others_are_restored(
+    in_sessions: tuple[str, Noting], many: bool
+) -> None:
+    """As a resumed run is: in other environments, which have begun with other episodes."""
+    file, policy = in_sessions
+
+    def made() -> Any:
+        if many:
+            return sd.make_vec(file, 2, seats={"bob": policy}, autoreset_mode="SameStep")
+        return sd.make(file, seats={"bob": policy})
+
+    def told_of_the_next(envs: Any) -> list[tuple[str, list[bool]]]:
+        policy.notes = []
+        while many and len(policy.notes) < 4:
+            envs.step(np.tile([7, 0, 0, 0], (2, 1)))
+        for _ in range(0 if many else 4):
+            envs.reset()
+        return policy.notes
+
+    before, after = made(), made()
+    before.reset(seed=4)
+    told_of_the_next(before)  # until the middle of a session
+    moment = before.snapshot()
+    after.reset(seed=4)
+    after.restore(moment)
+    assert told_of_the_next(after) == told_of_the_next(before)
+
+
 def test_nobody_on_a_seat_stays_and_is_silent(two: str) -> None:
     env = sd.make(two, seats={"bob": "nobody"}).unwrapped
     env.reset(seed=1)

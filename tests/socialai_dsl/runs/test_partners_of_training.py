@@ -53,6 +53,30 @@ def test_a_run_with_partners_goes_on_as_one_that_never_stopped(
     assert found[0]["eval"] == found[1]["eval"]
 
 
+def test_what_partners_remember_goes_on_as_in_a_run_that_never_stopped(tmp_path: Path) -> None:
+    """To the bit, also where a run stops in the middle of a session, in which they remember earlier episodes."""
+    import torch
+
+    from socialai_dsl.trainer import checkpoint as checkpoints
+
+    text = (Path(sd.__file__).parents[1] / "scenarios" / f"{LEVERS}.yaml").read_text(encoding="utf-8")
+    text = text.replace(f"scenario: {Path(LEVERS).name}", "scenario: sessions").replace(
+        "horizon: 30", "horizon: 9"
+    )
+    file = tmp_path / "sessions.yaml"
+    file.write_text(text + "let: {luck: pick(1 | 2)}\nsession: {episodes: 5, same: luck}\n", encoding="utf-8")
+    few = OPTIONS | {"eval_episodes": 5}
+    partner = sd.train(file, out=tmp_path / "partner", frames=256, **few)
+    options = {**few, "seats": {"partner": [str(partner.folder)]}}
+    whole = sd.train(file, out=tmp_path / "whole", frames=1024, **options)
+    short = sd.train(file, out=tmp_path / "short", frames=512, **options)
+    again = sd.resume(short.folder, frames=1024)
+    one, other = (checkpoints.read_agent(run.folder).tensors for run in (whole, again))
+    assert one["partners.partner.0.memory"].any()
+    assert one.keys() == other.keys()
+    assert [name for name in one if not torch.equal(one[name], other[name])] == []
+
+
 def test_the_partners_stay_as_they_are(partner: sd.Run, tmp_path: Path) -> None:
     """The network of a partner is not that which learns, though it began as the same."""
     run = sd.train(
