@@ -272,8 +272,9 @@ class _Work:
             command += ["--device", options["device"]]
         if agent not in ("oracle", str(self._run.folder)):
             command += ["--seed", str(self._run.seed)]
-        if ":" in str(options.get("net", "")):
-            command += ["--net", options["net"]]
+        for name in ("net", "algorithm"):
+            if ":" in str(options.get(name, "")):
+                command += [f"--{name}", options[name]]
         return [*command, *(word for name in scenarios for word in ("--on", name)), "--json"]
 
     # -- processes -------------------------------------------------------------------------------------------

@@ -254,6 +254,18 @@ def test_what_a_run_is_asked_for_is_what_the_commands_take(file: Path) -> None:
         assert (asked.run, asked.on, asked.episodes, asked.seed) == (agent, ["help", "dance"], 30, seed)
 
 
+def test_an_agent_of_ones_own_code_is_tested_with_that_code(file: Path) -> None:
+    file.write_text(
+        "experiment: own\nset: {scenario: help, seeds: 1, frames: 1000, tests: [dance], net: 'mine:Net'}\n"
+        "conditions: [{name: learns, algorithm: 'mine:Algorithm', aux: 'mine:Loss', bonus: 'mine:Bonus'}]\n"
+    )
+    (run,) = runs_of(file.parent, document_of(load_experiment(file), None))
+    parser = argparse.ArgumentParser()
+    evaluate_command.add_arguments(parser.add_subparsers().add_parser("evaluate"))
+    asked = parser.parse_args(_Work(run, lambda: False)._test_command(["dance"]))
+    assert (asked.net, asked.algorithm) == ("mine:Net", "mine:Algorithm")
+
+
 @pytest.mark.slow
 def test_a_real_run(file: Path, capsys: Capture) -> None:
     """The words of the command line are those that `socialai run` and `socialai evaluate` know."""
