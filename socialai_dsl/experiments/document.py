@@ -24,6 +24,9 @@ FORMAT: Final = 1
 OF_ANY_AGENT: Final = ("device", "eval_episodes")
 """Options that also matter to agents that are not trained."""
 
+OF_OWN_CODE: Final = ("net", "algorithm")
+"""Options that also matter to a checkpoint, where they name code of one's own."""
+
 _WITHOUT_EFFECT: Final = ("key_from", "concurrency", "timeout", "budget", "prices")
 """Options of language models on which no reply depends."""
 
@@ -121,11 +124,18 @@ def config_of(cell: Cell, seed: int = 0) -> RunConfig:
     options = {name: value for name, value in cell.options.items() if name != "hyper"}
     options |= cell.options.get("hyper", {})
     if not cell.trains:
-        kept = {name: options[name] for name in OF_ANY_AGENT if name in options}
+        kept = {name: options[name] for name in (*OF_ANY_AGENT, *_own_code(cell)) if name in options}
         return resolved_config(given | kept | {"frames": 0})
     if cell.frames is not None:
         given["frames"] = cell.frames
     return resolved_config(given | options)
+
+
+def _own_code(cell: Cell) -> list[str]:
+    """The options that name code of one's own by which a checkpoint plays."""
+    if _is_named(cell.agent) or cell.agent.startswith(PREFIX):
+        return []
+    return [name for name in OF_OWN_CODE if ":" in cell.options.get(name, "")]
 
 
 def options_of(cell: Cell) -> dict[str, Any]:
@@ -135,7 +145,7 @@ def options_of(cell: Cell) -> dict[str, Any]:
     """
     config = config_of(cell).model_dump()
     if not cell.trains:
-        played = {name: config[name] for name in OF_ANY_AGENT}
+        played = {name: config[name] for name in (*OF_ANY_AGENT, *_own_code(cell))}
         played |= {"trials": cell.trials} if cell.trials > 1 else {}
         return played | ({"model": dict(cell.model)} if cell.model else {})
     asked = [name for name in cell.options if name not in ("hyper", "recipe")]

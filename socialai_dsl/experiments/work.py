@@ -17,6 +17,7 @@ from typing import IO, Final
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.errors import UnreadableError, described_error
+from socialai_dsl.experiments.document import OF_OWN_CODE
 from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
 from socialai_dsl.runs.folder import (
     CANCEL,
@@ -233,6 +234,12 @@ class _Work:
             path.replace(self._run.folder / path.name)
         shutil.rmtree(self._run.folder / PLAYED)
 
+    @property
+    def _own_code(self) -> dict[str, str]:
+        """The code of the user's own by which the agent plays, by option, which no checkpoint may name alone."""
+        options = self._condition["options"]
+        return {name: options[name] for name in OF_OWN_CODE if ":" in str(options.get(name, ""))}
+
     def _play_command(self) -> list[str]:
         condition, options = self._condition, self._condition["options"]
         asked = dict(options.get("model", {}))
@@ -244,6 +251,7 @@ class _Work:
         agent = condition["agent"]
         if agent != "oracle" and not agent.startswith((MODEL_PREFIX, RIVAL_PREFIX)):
             values |= {"seed": self._run.seed} | ({} if agent in UNTRAINED else {"device": options["device"]})
+        values |= self._own_code
         words = [word for name, value in values.items() for word in (f"--{name}", str(value))]
         out = ["--out", str(self._run.folder / PLAYED), "--json"]
         return ["evaluate", agent, "--on", condition["scenario"], *words, *switches, *out]
@@ -272,9 +280,7 @@ class _Work:
             command += ["--device", options["device"]]
         if agent not in ("oracle", str(self._run.folder)):
             command += ["--seed", str(self._run.seed)]
-        for name in ("net", "algorithm"):
-            if ":" in str(options.get(name, "")):
-                command += [f"--{name}", options[name]]
+        command += [word for name, value in self._own_code.items() for word in (f"--{name}", value)]
         return [*command, *(word for name in scenarios for word in ("--on", name)), "--json"]
 
     # -- processes -------------------------------------------------------------------------------------------

@@ -254,16 +254,27 @@ def test_what_a_run_is_asked_for_is_what_the_commands_take(file: Path) -> None:
         assert (asked.run, asked.on, asked.episodes, asked.seed) == (agent, ["help", "dance"], 30, seed)
 
 
-def test_an_agent_of_ones_own_code_is_tested_with_that_code(file: Path) -> None:
+@pytest.mark.parametrize("agent", ["ppo", "mine.safetensors", "shipped:help", "random"])
+def test_an_agent_of_ones_own_code_plays_by_that_code(agent: str, file: Path) -> None:
+    """The one that is trained here, and a checkpoint; of others the settings for all conditions say nothing."""
+    (file.parent / "mine.safetensors").write_bytes(b"weights")
+    own = {"net": "mine:Net", "algorithm": "mine:Algorithm"}
     file.write_text(
-        "experiment: own\nset: {scenario: help, seeds: 1, frames: 1000, tests: [dance], net: 'mine:Net'}\n"
-        "conditions: [{name: learns, algorithm: 'mine:Algorithm', aux: 'mine:Loss', bonus: 'mine:Bonus'}]\n"
+        f"experiment: own\nset: {{scenario: help, seeds: 1, frames: 1000, agent: '{agent}', net: 'mine:Net'}}\n"
+        "conditions:\n"
+        "  - {name: one, tests: [dance], algorithm: 'mine:Algorithm', aux: 'mine:Loss', bonus: 'mine:Bonus'}\n"
+        + ("" if agent == "ppo" else "  - {name: more, trials: 5, algorithm: 'mine:Algorithm'}\n")
     )
-    (run,) = runs_of(file.parent, document_of(load_experiment(file), None))
+    named: dict[str, Any] = dict.fromkeys(own) if agent in ("random", "shipped:help") else dict(own)
     parser = argparse.ArgumentParser()
     evaluate_command.add_arguments(parser.add_subparsers().add_parser("evaluate"))
-    asked = parser.parse_args(_Work(run, lambda: False)._test_command(["dance"]))
-    assert (asked.net, asked.algorithm) == ("mine:Net", "mine:Algorithm")
+    one, *more = runs_of(file.parent, document_of(load_experiment(file), None))
+    assert {name: one.options.get(name) for name in own} == named
+    commands = [_Work(one, lambda: False)._test_command(["dance"])]
+    commands += [_Work(run, lambda: False)._play_command() for run in more]
+    for command in commands:
+        asked = parser.parse_args(command)
+        assert {"net": asked.net, "algorithm": asked.algorithm} == named
 
 
 @pytest.mark.slow
