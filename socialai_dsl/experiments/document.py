@@ -27,6 +27,9 @@ OF_ANY_AGENT: Final = ("device", "eval_episodes")
 OF_OWN_CODE: Final = ("net", "algorithm")
 """Options that also matter to a checkpoint, where they name code of one's own."""
 
+_PROGRAMS: Final = "test_programs"
+"""The key of a condition's tests with the digests of their scenarios."""
+
 _WITHOUT_EFFECT: Final = ("key_from", "concurrency", "timeout", "budget", "prices")
 """Options of language models on which no reply depends."""
 
@@ -47,9 +50,8 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         OSError: a checkpoint cannot be read.
     """
     cells = [completed(cell, loaded.played[cell.scenario]) for cell in loaded.cells[profile]]
-    programs = {
-        name: compile_loaded(loaded.played[name]).sha256 for name in {cell.scenario for cell in cells}
-    }
+    names = {name for cell in cells for name in (cell.scenario, *cell.tests)}
+    programs = {name: compile_loaded(loaded.played[name]).sha256 for name in names}
     weights = {
         cell.agent: _weights_digest(loaded.folder / located(cell.agent))
         for cell in cells
@@ -61,7 +63,7 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         "profile": profile,
         "about": loaded.experiment.about,
         "source_sha256": _source_digest(loaded),
-        "conditions": [_condition(cell, loaded.folder) for cell in cells],
+        "conditions": [_condition(cell, loaded.folder, programs) for cell in cells],
         "runs": [
             {
                 "id": run_id(
@@ -169,8 +171,8 @@ def differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
         for key in ("name", "profile")
         if kept.get(key) != asked.get(key)
     ]
-    before = {condition["name"]: condition for condition in kept.get("conditions", ())}
-    now = {condition["name"]: condition for condition in asked["conditions"]}
+    before, programs_before = _without_programs(kept.get("conditions", ()))
+    now, programs = _without_programs(asked["conditions"])
     found += [f"the condition `{name}` is there, and not here" for name in before if name not in now]
     found += [f"the condition `{name}` is here, and not there" for name in now if name not in before]
     for name in now:
@@ -189,7 +191,21 @@ def differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
         and before[name] == now[name]
         and any(runs_before[name].get(seed, run) != run for seed, run in runs_now[name].items())
     ]
+    found += [
+        f"`{name}`: {test}, one of its tests, has changed since"
+        for name in now
+        for test, program in programs[name].items()
+        if programs_before.get(name, {}).get(test, program) != program
+    ]
     return found
+
+
+def _without_programs(
+    conditions: Sequence[Mapping[str, Any]],
+) -> tuple[dict[str, dict[str, Any]], dict[str, Mapping[str, str]]]:
+    """Conditions by name, and apart the digests of their tests, which folders of earlier versions lack."""
+    rest = {one["name"]: {k: v for k, v in one.items() if k != _PROGRAMS} for one in conditions}
+    return rest, {one["name"]: one.get(_PROGRAMS, {}) for one in conditions}
 
 
 def _changes(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -213,7 +229,7 @@ def _listed(seeds: Mapping[int, str]) -> str:
     return ", ".join(map(str, seeds))
 
 
-def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
+def _condition(cell: Cell, folder: Path, programs: Mapping[str, str]) -> dict[str, Any]:
     return {
         "name": cell.name,
         "row": cell.row,
@@ -224,6 +240,7 @@ def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
         "frames": cell.frames if cell.trains else None,
         "options": _options(cell, folder),
         "tests": [from_anywhere(name, folder) for name in cell.tests],
+        _PROGRAMS: {from_anywhere(name, folder): programs[name] for name in cell.tests},
         "reference": _reference(cell.reference),
         "test_references": {
             from_anywhere(name, folder): _reference(reference)

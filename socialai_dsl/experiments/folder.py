@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,11 +28,13 @@ class PlannedRun(Run):
     Attributes:
         condition: of the first condition that it belongs to, as `experiment.json` has it. seed: the run's.
         tests: scenarios that any of its conditions wants the agent to play besides.
+        programs: digests of these, as far as they are known.
     """
 
     condition: Mapping[str, Any]
     seed: int
     tests: tuple[str, ...]
+    programs: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -59,11 +61,16 @@ class PlannedRun(Run):
 
     @property
     def missing_tests(self) -> list[str]:
-        """What the agent has not played yet."""
+        """What the agent has not played yet, as it is now."""
         if not self.tests:
             return []
         tested = self.tested
-        return [name for name in self.tests if name not in tested]
+        return [name for name in self.tests if name not in tested or self._has_changed(name, tested[name])]
+
+    def _has_changed(self, name: str, figures: Mapping[str, Any]) -> bool:
+        """Whether a test that was played is another one now, as far as that is known."""
+        played, asked = figures.get("program_sha256"), self.programs.get(name)
+        return None not in (played, asked) and played != asked
 
 
 def runs_of(folder: Path, document: Mapping[str, Any]) -> list[PlannedRun]:
@@ -75,7 +82,12 @@ def runs_of(folder: Path, document: Mapping[str, Any]) -> list[PlannedRun]:
     runs = []
     for identity, uses in wanted.items():
         tests = dict.fromkeys(test for condition, _ in uses for test in condition["tests"])
-        runs.append(PlannedRun(folder / RUNS / identity, *uses[0], tuple(tests)))
+        programs = {
+            test: program
+            for condition, _ in uses
+            for test, program in condition.get("test_programs", {}).items()
+        }
+        runs.append(PlannedRun(folder / RUNS / identity, *uses[0], tuple(tests), programs))
     return runs
 
 

@@ -224,7 +224,10 @@ class _Work:
                 output.truncate()
             output.seek(0)
             found = json.loads(output.read())
-        figures = {name: entry["eval"] for name, entry in zip(missing, found, strict=True)}
+        figures = {
+            name: entry["eval"] | {"program_sha256": entry["program_sha256"]}
+            for name, entry in zip(missing, found, strict=True)
+        }
         write_json(self._run.folder / TESTS, self._run.tested | figures)
 
     def _take_results(self) -> None:

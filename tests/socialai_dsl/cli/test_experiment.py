@@ -292,7 +292,7 @@ def test_a_real_run(file: Path, capsys: Capture) -> None:
     result, tests = (json.loads((folder / name).read_text()) for name in ("result.json", "tests.json"))
     assert (result["frames"], result["eval"]["episodes"]) == (256, 3)
     assert tests["help_as_helper"]["episodes"] == 3
-    assert tests["help_as_helper"].keys() == result["eval"].keys()
+    assert tests["help_as_helper"].keys() == result["eval"].keys() | {"program_sha256"}
     config = json.loads((folder / "config.json").read_text())
     chance = json.loads((folder.parent / told["runs"][1]["id"] / "result.json").read_text())
     assert chance["eval"]["actions"] == "sampled actions, seed 1", (

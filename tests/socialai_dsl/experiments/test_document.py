@@ -9,11 +9,15 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.atomic import write_json
 from socialai_dsl.checking.experiments import LoadedExperiment
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.document import completed, config_of, differences, document_of
+from socialai_dsl.experiments.folder import runs_of
 from socialai_dsl.frontend import check, load, load_experiment
 from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.runs.folder import TESTS
 from socialai_dsl.schema.experiment import NETS, Hyper, Settings
 
 ROOT = Path(__file__).parents[3]
@@ -124,6 +128,7 @@ def test_what_a_condition_says(tmp_path):
             "hyper": {"bonus_c": 3.0},
         },
         "tests": ["help"],
+        "test_programs": {"help": compile_loaded(load("help")).sha256},
         "reference": {"mean": 0.5, "std": 0.1, "n": 3, "deviation": "sample", "note": None, "source": None},
         "test_references": {
             "help": {"mean": 0.3, "std": None, "n": None, "deviation": "sample", "note": None, "source": None}
@@ -165,6 +170,27 @@ def test_a_changed_scenario_is_a_difference(tmp_path):
     kept = document(tmp_path, "")
     changed = kept | {"runs": [{**kept["runs"][0], "id": "0"}]}
     assert differences(changed, kept) == ["`one`: its scenario, its checkpoint or its code has changed since"]
+
+
+def test_a_changed_scenario_of_a_test_is_a_difference_and_is_played_again(tmp_path):
+    """But not the run, which has not changed."""
+    room, name = tmp_path / "room.yaml", str(tmp_path / "room.yaml")
+    found = []
+    for horizon in (20, 30):
+        room.write_text(f"scenario: mine\nextends: dance.yaml\nhorizon: {horizon}\n")
+        found.append(document(tmp_path, ", tests: [room.yaml]"))
+    kept, changed = found
+    assert kept["runs"] == changed["runs"]
+    assert differences(kept, changed) == [f"`one`: {name}, one of its tests, has changed since"]
+    (run,), (same,) = (runs_of(tmp_path, one) for one in (changed, kept))
+    figures = {name: {"program_sha256": kept["conditions"][0]["test_programs"][name]}}
+    run.folder.mkdir(parents=True)
+    write_json(run.folder / TESTS, figures)
+    assert (run.missing_tests, same.missing_tests) == ([name], [])
+    write_json(run.folder / TESTS, {name: {}})  # results and folders of earlier versions do not say
+    assert run.missing_tests == []
+    del kept["conditions"][0]["test_programs"]
+    assert differences(kept, changed) == []
 
 
 def test_phases_are_named_from_the_file_and_count_by_what_they_say(tmp_path, monkeypatch):
