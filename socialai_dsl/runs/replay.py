@@ -114,7 +114,8 @@ def _played(
 ) -> list[Trace]:
     """Those episodes that were asked for, or successes and failures, of a run or a scenario."""
     evaluation: Evaluation | None = None
-    trials, named, rooms = 1, list[tuple[str, str]](), TEST_ROOMS
+    remembered: int | None = None
+    named, rooms = list[tuple[str, str]](), TEST_ROOMS
     if (folder_of(source) / CONFIG).is_file():
         if agent is not None:
             raise OptionError(
@@ -124,17 +125,18 @@ def _played(
         evaluation = _kept(folder, scenario, episodes if numbers is None else max(numbers) + 1, greedy)
         player = made_player(source, [], _greedy(greedy), None) if evaluation is None else evaluation.player
         run, rooms = Run(folder), rooms_of(folder)
-        trials = (run.result or {}).get("trials", 1)
+        remembered = (run.result or {}).get("trials")
         named = [(seat, names[0]) for seat, names in run.config.partners.items()]
     else:
         scenario, player = source, _player_of_scenario(source, agent, greedy)
     if evaluation is None:
         # What a policy of one's own does may depend on all that it played before.
         if numbers is not None and player.policy is None:
-            return _alone(player, scenario, numbers, trials, named, rooms)
+            return _alone(player, scenario, numbers, remembered, named, rooms)
         loaded, count = load(scenario), episodes if numbers is None else max(numbers) + 1
-        most = rooms.count // trials * trials
-        program, whole = compiled(loaded), min(-(-count // trials) * trials, most)
+        program = compiled(loaded)
+        trials = remembered or program.session
+        whole = min(-(-count // trials) * trials, rooms.count // trials * trials)
         partners = partners_of(named, scenario, program)
         evaluation = play_test_set(player, scenario, loaded, program, whole, trials, partners, room_set=rooms)
     _warn(evaluation.warnings)
@@ -150,7 +152,12 @@ def _played(
 
 
 def _alone(
-    player: Player, scenario: str, numbers: Sequence[int], trials: int, named: Named, rooms: RoomSet
+    player: Player,
+    scenario: str,
+    numbers: Sequence[int],
+    remembered: int | None,
+    named: Named,
+    rooms: RoomSet,
 ) -> list[Trace]:
     """These episodes, without playing others than those of their sessions."""
     for number in numbers:
@@ -158,7 +165,7 @@ def _alone(
             raise OptionError("test_episode", f"got {number}, expected 0 to {rooms.count - 1}")
     loaded = load(scenario)
     program = compiled(loaded)
-    partners = partners_of(named, scenario, program)
+    partners, trials = partners_of(named, scenario, program), remembered or program.session
     traces, told = trace_test_episodes(player, scenario, loaded, program, numbers, trials, partners, rooms)
     _warn(told, callers=5)
     return traces

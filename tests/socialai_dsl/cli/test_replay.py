@@ -103,6 +103,17 @@ def test_the_agent_of_a_folder_plays_again_with_its_seed_and_its_trials(trials: 
     ]
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_who_plays_a_scenario_with_sessions_remembers_them_as_in_an_evaluation(alone: bool) -> None:
+    """What chance draws follows from the number of the first episode that it remembers."""
+    file = Path(__file__).parents[2] / "data" / "agreement" / "sessions.yaml"
+    evaluated = sd.evaluate("random", file, 6).traces([1, 5])
+    asked: dict[str, Any] = {"test_episodes": [1, 5]} if alone else {"episodes": 6, "record": 6}
+    replayed = {one.episode: one for one in sd.replay(file, agent="random", **asked)}
+    for one in evaluated:
+        assert [m.action for m in replayed[one.episode].moments] == [m.action for m in one.moments]
+
+
 def test_what_trace_prints_can_be_replayed(capsys: Capture) -> None:
     assert main(["trace", "talkitout", "--test-episode", "7", "--json"]) == 0
     printed = capsys.readouterr().out
