@@ -185,6 +185,7 @@ def resume(folder: str | Path, *, progress: Report | None = None, **options: Any
     _resumable(run)  # so that no folder is made where there is none
     with only_writer(run.folder):
         config = continued_config(_resumable(run), options, run.folder)
+        _refuse_less(config, run)
         loaded = load(config.played)
         return _perform(run, config, loaded, compiled(loaded), True, progress)
 
@@ -230,6 +231,15 @@ def _player(agent: str, config: RunConfig, seed: int, out: Path | None = None) -
         folder=config.code_folder,
         out=out,
     )
+
+
+def _refuse_less(config: RunConfig, run: Run) -> None:
+    """Refuse a run of fewer frames than there are already, which cannot be taken back."""
+    done = run.checkpoint_frames or 0
+    if config.updates * config.frames_per_update < done:
+        raise OptionError(
+            "frames", f"got {config.frames}, but the run has {done} already; expected at least as many"
+        )
 
 
 def _resumable(run: Run) -> RunConfig:

@@ -31,6 +31,11 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run.result == json.loads((run.folder / "result.json").read_text())
     assert (run.config.frames, run.config.lr, run.checkpoint_frames) == (512, 7e-4, 512)
     assert run.agent == str(run.folder)
+    with pytest.raises(
+        UsageError, match="frames: got 256, but the run has 512 already; expected at least as many"
+    ):
+        sd.resume(run.folder, frames=256)
+    assert run.config.frames == 512
     longer = sd.resume(run.folder, frames=768)
     assert longer == run
     assert longer.result is not None
