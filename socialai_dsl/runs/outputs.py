@@ -22,12 +22,17 @@ from socialai_dsl.runs.recordings import write_tables
 from socialai_dsl.traces.page import replay_page
 from socialai_dsl.trainer.config import RunConfig
 
+_FAILURE: Final = (f"{FAILURE}.gif", f"{FAILURE}.txt")
+"""Film and transcript of a failure."""
+
 _REPLAYED: Final = 5
 """The number of failures, and of successes, that the page of a run replays."""
 
 
 def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     """Film the first success, or the first episode if there is none, and where there are both, the first failure.
+
+    What an earlier test of the run left of a failure goes: it is of another agent.
 
     A page replays some successes and failures, and tables list all episodes, and whom the player asked.
     """
@@ -36,7 +41,9 @@ def record_run(evaluation: Evaluation, folder: Path, label: str) -> None:
     success = evaluation.result.success
     shown = {(FILM, TRANSCRIPT): int(success.argmax())}
     if success.any() and not success.all():
-        shown[f"{FAILURE}.gif", f"{FAILURE}.txt"] = int(success.argmin())
+        shown[_FAILURE] = int(success.argmin())
+    for name in _FAILURE:
+        (folder / name).unlink(missing_ok=True)
     for (film, transcript), number in shown.items():
         episode = evaluation.record(number, label)
         write_text(folder / transcript, episode.transcript())

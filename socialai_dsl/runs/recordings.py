@@ -2,9 +2,10 @@
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from socialai_dsl.atomic import write_text
 from socialai_dsl.episodes.asking import Answer
@@ -12,6 +13,8 @@ from socialai_dsl.evaluation.asked import asked_in
 from socialai_dsl.evaluation.test_set import Evaluation
 from socialai_dsl.runs.folder import ASKED, EPISODES, REPLAY, only_writer, scenario_folder_name
 from socialai_dsl.traces.page import replay_page
+
+_RECORDING: Final = re.compile(r"(success|failure)-\d+\.(gif|txt)")
 
 
 def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
@@ -31,6 +34,8 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
 def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
     """Record up to `count` successes and as many failures, a page with them included, and list all episodes.
 
+    Recordings that an earlier evaluation left there go, as its page and its lists do.
+
     Args:
         evaluation: what was played.
         folder: gets a folder named after the scenario, which is returned.
@@ -42,6 +47,9 @@ def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label
     """
     place = folder / scenario_folder_name(evaluation.scenario)
     place.mkdir(parents=True, exist_ok=True)
+    for file in place.iterdir():
+        if file.name == REPLAY or _RECORDING.fullmatch(file.name):
+            file.unlink()
     replayed = evaluation.to_replay(count)
     for number in replayed:
         if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show

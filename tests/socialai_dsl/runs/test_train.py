@@ -10,6 +10,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.errors import UsageError
+from socialai_dsl.runs.outputs import record_run
 
 WILD = '{"scenario": "help", "net": []}'
 QUICK: dict[str, Any] = {
@@ -142,3 +143,26 @@ def half(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "mine.yaml").write_text("scenario: mine\nextends: help\n")
     options = {**QUICK, "frames": 256, "recipe": "plain"}
     return sd.train(place / "mine.yaml", out=place / "run", **options).folder
+
+
+def test_what_an_earlier_player_left_in_a_folder_is_not_shown_as_of_the_next_one(tmp_path: Path) -> None:
+    """Chance fails, and the script does not; neither in the folder of an evaluation nor in that of a run."""
+
+    def shown(folder: Path) -> set[str]:
+        return {file.name for file in folder.iterdir() if file.suffix in (".gif", ".html", ".txt")}
+
+    def left(agent: str, record: int = 1) -> set[str]:
+        place = sd.evaluate(agent, "help", 4, out=tmp_path / "same", record=record).folder
+        assert place is not None
+        return shown(place)
+
+    assert left("random") == {"failure-000.gif", "failure-000.txt", "episode.html"}
+    assert left("oracle") == {"success-000.gif", "success-000.txt", "episode.html"}
+    (tmp_path / "same" / "help" / "success-story.txt").write_text("of somebody else")
+    assert left("oracle", 0) == {"success-story.txt"}
+
+    run = sd.train("help", out=tmp_path / "run", agent="oracle", eval_episodes=4)
+    for name in ("failure.gif", "failure.txt"):
+        (run.folder / name).write_text("of an earlier test")
+    record_run(sd.evaluate("oracle", "help", 4), run.folder, "script")
+    assert shown(run.folder) == {"episode.gif", "transcript.txt", "episode.html"}
