@@ -119,12 +119,14 @@ class ScenarioParallelEnv(Copied, ParallelEnv[str, Observation, NDArray[np.int64
         """
         if not self.agents:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
-        if set(actions) != set(self.agents):
-            raise ValueError(
-                f"step: got actions of {', '.join(map(str, actions))}; expected {', '.join(self.agents)}"
+        if not isinstance(actions, Mapping) or set(actions) != set(self.agents):
+            given = (
+                f"actions of {', '.join(map(str, actions))}"
+                if isinstance(actions, Mapping)
+                else repr(actions)
             )
-        given = [actions[name] for name in self.possible_agents]
-        ended = self._table.step(Task.STEP_ONLY, given)
+            raise ValueError(f"step: got {given}; expected actions of {', '.join(self.agents)}")
+        ended = self._table.step(Task.STEP_ONLY, [actions[name] for name in self.possible_agents])
         ports, infos = self._table.batch.ports, self._infos()
         rewards = {name: float(ports.reward[seat]) for seat, name in enumerate(self.possible_agents)}
         truncated = bool(ended) and int(self._table.state.registers[0, Register.ENDED]) == TRUNCATED

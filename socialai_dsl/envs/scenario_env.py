@@ -60,9 +60,11 @@ def encode_action(
         ValueError: what was given is none of these; the message says what was got and what was expected.
     """
     parts = ", ".join(["body action", "template", *(slot.name for slot in sentences.slots)])
+    axes = getattr(action, "ndim", 1)  # of an array
     if (
         isinstance(action, str)
         or not isinstance(action, Sequence | np.ndarray)
+        or axes != 1
         or len(action) not in (2, 2 + len(sentences.slots))
     ):
         forms = f"({parts}) or (body action, sentence), each part a word, a number or None"

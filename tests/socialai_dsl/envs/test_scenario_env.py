@@ -82,6 +82,8 @@ def test_encode_action(given: Any, expected: list[int]) -> None:
         ((None, "I would like to leave"), "which the grammar cannot say; expected a text such as"),
         ("forward", "expected \\(body action"),
         ((1,), "expected \\(body action"),
+        (np.array(1), "expected \\(body action"),
+        (np.zeros((2, 4), np.int64), "expected \\(body action"),
         ((True, None), "expected a number"),
         ((None, 3.5, 1), "expected a number"),
     ],

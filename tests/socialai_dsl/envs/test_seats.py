@@ -411,8 +411,11 @@ def test_a_reset_of_no_game_begins_none_in_a_parallel_environment(two: str) -> N
 def test_a_parallel_environment_asks_for_all_actions(two: str) -> None:
     env = sd.make_parallel(two)
     env.reset(seed=0)
-    with pytest.raises(ValueError, match="got actions of agent; expected agent, bob"):
+    with pytest.raises(ValueError, match="got actions of agent; expected actions of agent, bob"):
         env.step({"agent": np.zeros(4, np.int64)})
+    for given in (None, 3, np.zeros((2, 4), np.int64)):
+        with pytest.raises(ValueError, match="; expected actions of agent, bob"):
+            env.step(given)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="a scenario"):
         sd.make_parallel("social_env")
 
