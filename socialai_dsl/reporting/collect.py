@@ -57,7 +57,14 @@ from socialai_dsl.runs.folder import (
     WORDS,
     Run,
 )
-from socialai_dsl.trainer.config import HYPER, PARTNERS_FOLDER, RunConfig, configure, scenario_in
+from socialai_dsl.trainer.config import (
+    HYPER,
+    PARTNERS_FOLDER,
+    WITHOUT_EFFECT,
+    RunConfig,
+    configure,
+    scenario_in,
+)
 
 Content = TypeVar("Content")
 
@@ -67,6 +74,9 @@ _FIGURES: Final[Mapping[str, tuple[type[Record], str]]] = {
     DILEMMAS: (DilemmasRecord, "socialai check --pictures"),
 }
 """Files of figures besides those of runs: what they hold, and which command writes them."""
+
+_SIZES: Final = ("envs", "precision")
+"""Options with a flag of their own that are numbers or words of the trainer."""
 
 _RESULT: Final = TypeAdapter(ResultRecord)
 _STATUS: Final = TypeAdapter(StatusRecord)
@@ -215,7 +225,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     Raises:
         ValueError: a folder is not that of a run.
     """
-    grouped: dict[tuple[str, str, str], list[tuple[dict[str, Any], RunRecord]]] = {}
+    grouped: dict[tuple[str, str, str, int | None], list[tuple[dict[str, Any], RunRecord]]] = {}
     called = [folder.name for folder in folders]
     for folder in folders:
         settings = _settings(folder, [])
@@ -227,22 +237,24 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
         column = ", ".join([_column(settings), *_granted(run.result)])
-        key = str(settings["scenario"]), _scenario_digest(folder), column
+        key = str(settings["scenario"]), _scenario_digest(folder), column, _frames_asked(settings)
         grouped.setdefault(key, []).append((settings, run))
     conditions = []
-    for (scenario, digest, column), members in grouped.items():
+    for (scenario, digest, column, frames), members in grouped.items():
         settings, first = members[0]
         row = scenario.removeprefix(f"{SCENARIO}/")
-        if sum(key[::2] == (scenario, column) for key in grouped) > 1:
+        alike = [key for key in grouped if (key[0], key[2]) == (scenario, column)]
+        if len({key[1] for key in alike}) > 1:
             row += f" ({digest[:6]})"  # another file of the same name
-        frames = settings.get("frames")
+        if len({key[3] for key in alike}) > 1:
+            column += f", {frames or 0:,} frames"
         entry = ConditionEntry(
             name=f"{row} / {column}",
             row=row,
             column=column,
             scenario=scenario_in(first.folder, scenario),
             agent=str(settings.get("agent", "ppo")),
-            frames=frames if isinstance(frames, int) and frames > 0 else None,
+            frames=frames,
             tests=sorted({test for _, run in members for test in run.tests}),
         )
         conditions.append(
@@ -291,6 +303,12 @@ def _scenario_digest(folder: Path) -> str:
     for file in sorted((folder / SCENARIO).rglob("*.y*ml")):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
+
+
+def _frames_asked(settings: Mapping[str, Any]) -> int | None:
+    """The frames that a run trains for; None where nobody is trained."""
+    frames = settings.get("frames")
+    return frames if isinstance(frames, int) and frames > 0 else None
 
 
 def _column(settings: Mapping[str, Any]) -> str:
@@ -346,7 +364,8 @@ def unusual(settings: Mapping[str, Any]) -> list[str]:
         configure(config.recipe, net=config.net).model_dump(),
         ("bonus", "curriculum", "guide", "aux"),
     )
-    chosen = [name for name in (*words, *HYPER) if getattr(config, name) != told[name]]
+    counts = [name for name in (*words, *_SIZES, *HYPER) if name not in WITHOUT_EFFECT]
+    chosen = [name for name in counts if getattr(config, name) != told[name]]
     return named + [
         f"{name} {getattr(config, name)}" if name in words else f"{name}={getattr(config, name)}"
         for name in chosen

@@ -10,6 +10,7 @@ import pytest
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.reporting.collect import RunRecord, read_experiment, read_runs
 from socialai_dsl.runs.lock import hold
+from socialai_dsl.trainer.config import WITHOUT_EFFECT, RunConfig
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
 
 
@@ -147,6 +148,54 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
     assert columns == ["ppo", "ppo, lr=0.1", "ppo"]
     with pytest.raises(ValueError, match=r"expected the folder of a run, with its config\.json"):
         read_runs([tmp_path])
+
+
+def changed(name: str, value: Any) -> Any:
+    """Another value of an option."""
+    words = {
+        "update": "chunks",
+        "loss": "per_head",
+        "returns": "episode",
+        "bonus_formula": "as_printed",
+        "precision": "bfloat16",
+        "recipe": "guided",
+        "device": "cuda",
+    }
+    if isinstance(value, bool):
+        return not value
+    if name == "bptt":
+        return 16
+    if isinstance(value, str) or name == "wandb":
+        return words.get(name, "mine:Own")
+    if name == "seats":
+        return {"jill": ["random"]}
+    return 2 * value if isinstance(value, int) else (value or 1.0) / 2
+
+
+@pytest.mark.parametrize("name", sorted(RunConfig.model_fields.keys() - {"scenario", "agent", "seed"}))
+def test_runs_that_compute_something_else_are_no_seeds_of_each_other(name: str, tmp_path: Path) -> None:
+    """Whatever keeps a run from going on with other options makes another condition, and so do the frames."""
+    folders = [write_run(tmp_path / str(seed), "help", seed, 0.5) for seed in (0, 1)]
+    one = RunConfig(scenario="help", update="chunks" if name == "bptt" else "environments", bptt=8)
+    other = one.model_copy(update={name: changed(name, getattr(one, name)), "seed": 1})
+    for folder, config in zip(folders, (one, other), strict=True):
+        (folder / "config.json").write_text(config.model_dump_json())
+    apart = name == "frames" or set(one.differences(other)) != {"seed"}
+    assert apart or name in {*WITHOUT_EFFECT, "device", "threads", "eval_episodes"}
+    RunConfig.model_validate_json(other.model_dump_json())
+    found = {condition.entry.name for condition in read_runs(folders).conditions}
+    assert len(found) == 1 + apart
+
+
+def test_frames_are_named_where_they_tell_conditions_apart(tmp_path: Path) -> None:
+    folders = [write_run(tmp_path / str(seed), "help", seed, 0.5) for seed in (0, 1, 2)]
+    for folder, frames, seed in zip(folders, (1000, 2000, 2000), (0, 0, 1), strict=True):
+        config = RunConfig(scenario="help", frames=frames, seed=seed)
+        (folder / "config.json").write_text(config.model_dump_json())
+    short, long = read_runs(folders).conditions
+    assert (short.entry.column, long.entry.column) == ("ppo, 1,000 frames", "ppo, 2,000 frames")
+    assert (len(long.runs), long.entry.frames) == (2, 2000)
+    assert [one.entry.column for one in read_runs(folders[1:]).conditions] == ["ppo"]
 
 
 @pytest.mark.parametrize(
