@@ -191,7 +191,8 @@ class _Work:
         """Train if the agent is to be trained, and play its own test set."""
         died_at: list[int] = []
         while not self._has_result():
-            crash = self._process(self._run_command())
+            # All may be played already, and have been left while it was moved.
+            crash = None if (self._played / RESULT).exists() else self._process(self._run_command())
             if crash is None and self._run.is_played:
                 self._take_results()
             if crash is None:
@@ -230,11 +231,18 @@ class _Work:
         }
         write_json(self._run.folder / TESTS, self._run.tested | figures)
 
+    @property
+    def _played(self) -> Path:
+        """Where `socialai evaluate` leaves what it has played; it writes the result last."""
+        return self._run.folder / PLAYED / scenario_folder_name(self._condition["scenario"])
+
     def _take_results(self) -> None:
         """Move what `socialai evaluate` left for the scenario to where a run has it, its result last."""
-        place = self._run.folder / PLAYED / scenario_folder_name(self._condition["scenario"])
-        for path in sorted(place.iterdir(), key=lambda path: path.name == RESULT):
-            path.replace(self._run.folder / path.name)
+        for path in sorted(self._played.iterdir(), key=lambda path: path.name == RESULT):
+            there = self._run.folder / path.name
+            if there.is_dir():
+                shutil.rmtree(there)
+            path.replace(there)
         shutil.rmtree(self._run.folder / PLAYED)
 
     @property

@@ -1,5 +1,6 @@
 """Players that are not trained, language models among them, as runs of an experiment."""
 
+import contextlib
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,7 +11,8 @@ import pytest
 from socialai_dsl.cli.main import main
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.experiments.document import document_of
-from socialai_dsl.experiments.folder import read_experiment, runs_of
+from socialai_dsl.experiments.folder import PlannedRun, read_experiment, runs_of
+from socialai_dsl.experiments.work import _Work
 from socialai_dsl.frontend import load_experiment
 from socialai_dsl.runs.folder import Run
 from tests.socialai_dsl.llm.endpoint import Stub, endpoint
@@ -136,3 +138,36 @@ def test_a_table_of_prices_stands_beside_the_experiment(tmp_path: Path) -> None:
     assert (
         found.span.column == FILE.splitlines()[-1].replace("URL", "http://localhost:1/v1").index("LIMIT") + 9
     )
+
+
+@pytest.mark.parametrize("moved", range(4))
+def test_results_that_were_left_while_they_were_moved_are_taken(
+    moved: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is played twice, wherever the process was killed; also in a folder that has some of it already."""
+    options = {"eval_episodes": 6, "trials": 3}
+    condition = {"name": "one", "scenario": "help", "agent": "random", "frames": None, "options": options}
+    work = _Work(PlannedRun(tmp_path / "run", condition, 0, ()), lambda: False)
+    place = tmp_path / "run" / "played" / "help"
+    (place / "scenario").mkdir(parents=True)
+    (tmp_path / "run" / "scenario").mkdir()
+    for folder, content in ((tmp_path / "run", "before"), (place, "{}")):
+        for name in ("episodes.csv", "scenario/help.yaml"):
+            (folder / name).write_text(content)
+    (place / "result.json").write_text("{}")
+    whole, moves = Path.replace, iter(range(moved))
+
+    def move(path: Path, target: Path) -> Path:
+        if next(moves, None) is None:
+            raise InterruptedError
+        return whole(path, target)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "replace", move)
+        with contextlib.suppress(InterruptedError):
+            work._train()
+    work._train()
+    found = {file.relative_to(tmp_path / "run").as_posix() for file in (tmp_path / "run").rglob("*.*")}
+    assert found == {"episodes.csv", "scenario/help.yaml", "result.json"}
+    assert (tmp_path / "run" / "scenario" / "help.yaml").read_text() == "{}"
+    assert not (tmp_path / "run" / "played").exists()
