@@ -169,7 +169,8 @@ def train(
 def resume(folder: str | Path, *, progress: Report | None = None, **options: Any) -> Run:
     """Go on with a run that was stopped, or train one for longer, as `socialai-run --resume` does.
 
-    The weights are those of a run that never stopped, to the bit on the same processor with as many threads.
+    The weights are those of a run that never stopped, to the bit on the same processor with as many threads. A run that
+    was killed before its first checkpoint begins anew.
 
     Args:
         folder: of the run.
@@ -187,7 +188,10 @@ def resume(folder: str | Path, *, progress: Report | None = None, **options: Any
         config = continued_config(_resumable(run), options, run.folder)
         _refuse_less(config, run)
         loaded = load(config.played)
-        return _perform(run, config, loaded, compiled(loaded), True, progress)
+        # A run that was killed before its first checkpoint begins anew; one that has lost its checkpoints does not.
+        left = run.last_metrics is not None or run.result is not None
+        begun = left or bool(checkpoint_files(run.folder / CHECKPOINTS))
+        return _perform(run, config, loaded, compiled(loaded), begun, progress)
 
 
 def _with_partners(config: RunConfig, program: Playable) -> RunConfig:

@@ -145,6 +145,21 @@ def half(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return sd.train(place / "mine.yaml", out=place / "run", **options).folder
 
 
+def test_a_run_that_was_killed_before_its_first_checkpoint_begins_anew(tmp_path: Path) -> None:
+    options = {**QUICK, "frames": 256, "recipe": "plain"}
+    whole = sd.train("help", out=tmp_path / "whole", **options)
+    (tmp_path / "killed" / "checkpoints").mkdir(parents=True)
+    shutil.copyfile(whole.folder / "config.json", tmp_path / "killed" / "config.json")
+    for name in ("metrics.jsonl", "checkpoints/000000000000000.tmp"):
+        (tmp_path / "killed" / name).touch()
+    with pytest.raises(UsageError, match="holds a run already; resume it"):
+        sd.train("help", out=tmp_path / "killed", **options)
+    again = sd.resume(tmp_path / "killed")
+    assert again.result is not None
+    assert whole.result is not None
+    assert again.result["eval"] == whole.result["eval"]
+
+
 def test_what_an_earlier_player_left_in_a_folder_is_not_shown_as_of_the_next_one(tmp_path: Path) -> None:
     """Chance fails, and the script does not; neither in the folder of an evaluation nor in that of a run."""
 
