@@ -206,7 +206,7 @@ class Sentences:
 
     Choices are indices into the words of each slot. A filling is one number for all of them, with a digit for each
     slot, the last slot's the least; the digit of a slot that a template lacks is one more than its last word's. Of a
-    grammar with `nouns` the filling is the noun, of templates without `<noun>` as well.
+    grammar with `nouns`, all of whose templates have `<noun>`, the filling is the noun.
 
     Attributes:
         templates: each with its slots. slots: in the order of the heads.
@@ -220,9 +220,7 @@ class Sentences:
     @classmethod
     def of(cls, templates: Sequence[str], slots: Sequence[Slot]) -> Sentences:
         """The sentences of a grammar."""
-        used = (
-            tuple(slot.name == NOUN or slot.place in template for slot in slots) for template in templates
-        )
+        used = (tuple(slot.place in template for slot in slots) for template in templates)
         return cls(tuple(templates), tuple(slots), tuple(used))
 
     @classmethod
@@ -276,7 +274,11 @@ class Sentences:
     @cached_property
     def radices(self) -> tuple[int, ...]:
         """How many digits each slot has in a filling."""
-        return tuple(len(slot.words) + (slot.name != NOUN) for slot in self.slots)
+        everywhere = (all(used[place] for used in self.used) for place in range(len(self.slots)))
+        return tuple(
+            len(slot.words) + (slot.name != NOUN or not in_all)
+            for slot, in_all in zip(self.slots, everywhere, strict=True)
+        )
 
     @cached_property
     def strides(self) -> tuple[int, ...]:

@@ -705,6 +705,40 @@ def test_4_7_the_choice_for_a_slot_that_is_not_there_changes_nothing(play: Folde
         assert run.act([run.env.action_space.nvec[0] - 1, 1, 1, n, 1]).info["utterance"] == "Ann: soup"
         assert not run.terminated
     assert run.step(None, "Take 3").terminated
+    for noun in (0, 1):
+        _nor_does_a_noun(play, noun)
+
+
+def _nor_does_a_noun(play: Folder, noun: int) -> None:
+    """In a sequence and a memory there is one `Hello` as well, so whoever says it repeats it."""
+    run = play("""
+        grammar: {templates: [Say <noun>, Hello], nouns: [red, blue]}
+        let: {dance: {sequence: 4, moves: [left], utterance: {chance: 1}}}
+        memory: {attempt: {last: 4}}
+        cast: {ann: {at: [4, 5], frame: listen}, agent: {at: [3, 5]}}
+        frames:
+          listen:
+            states:
+              s:
+                then:
+                  - {hears: any, when: noun == red, say: Red}
+                  - {hears: any, say: Not <noun>}
+                  - {hears: any, say: No noun}
+        outcome:
+          - success: attempt == dance
+          - failure: agent.noun == blue and not agent.said("Say blue")
+    """)
+    assert run.act([1, 1, 1, noun]).info["utterance"] == "Ann: No noun"
+    assert not run.terminated
+    assert run.step(None, "Say red").info["utterance"] == "Ann: Red"
+    heard = set()
+    for seed in range(9):
+        run.env.reset(seed=seed)
+        for _, said in run.state["let"]["dance"]:
+            heard.add(said)
+            run.act([0, 1, 1, noun]) if said == "Hello" else run.step("left", said)
+        assert run.info["success"] is True
+    assert heard == {"Say red", "Say blue", "Hello"}
 
 
 @pytest.mark.parametrize(("order", "ends"), [(("ann", "bob"), [2, 4]), (("bob", "ann"), [3, 4])])

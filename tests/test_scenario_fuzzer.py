@@ -193,7 +193,7 @@ SPOKEN_OF = (
 
 
 def test_random_scenarios_speak_of_most_of_the_language() -> None:
-    texts = [write(seed) for seed in range(120)]
+    texts = [write(seed) for seed in range(200)]
     missing = [word for word in SPOKEN_OF if not any(word in text for text in texts)]
     assert not missing
     assert all(re.match(r"scenario: random_\d+\n", text) for text in texts)

@@ -546,8 +546,7 @@ def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
 def noun(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     """`noun`: of what the rule heard, else of what the agent said in this step."""
     no_nouns(resolver, node, scope)
-    nouns = resolver.symbols.nouns
-    return HeardNoun(nouns, ()) if scope.hearing else World(nouns, "noun")
+    return in_slot(resolver, NOUN, scope.hearing)
 
 
 def no_nouns(resolver: Resolver, node: ast.Expr, scope: Scope) -> None:
@@ -559,9 +558,11 @@ def no_nouns(resolver: Resolver, node: ast.Expr, scope: Scope) -> None:
 
 def in_slot(resolver: Resolver, name: str, heard: bool) -> Term:
     """The word in a slot: of what the rule heard, else of what the agent said in this step."""
-    sentences, words = resolver.symbols.sentences, resolver.symbols.slots[name].words
-    place = [slot.name for slot in sentences.slots].index(name)
-    digit = Digit(sentences.strides[place], sentences.radices[place])
+    symbols = resolver.symbols
+    words = symbols.nouns if name == NOUN else symbols.slots[name].words
+    fillings = zip(symbols.sentences.slots, symbols.sentences.strides, symbols.sentences.radices, strict=True)
+    # Where every template has a noun, the filling is the noun.
+    digit = next((Digit(s, r) for slot, s, r in fillings if slot.name == name and r > len(slot.words)), None)
     return HeardNoun(words, (), digit) if heard else World(words, "noun", digit)
 
 

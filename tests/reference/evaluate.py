@@ -294,7 +294,7 @@ def same(a: Any, b: Any) -> bool:
         return False  # what is not there equals no value, and nothing else that is not there
     if isinstance(a, Entity) or isinstance(b, Entity):
         return a is b
-    if isinstance(a, Recall) and isinstance(b, Performance):
+    if isinstance(a, Recall) and isinstance(b, Recall | Performance):
         return a.equals(b)
     if isinstance(b, Recall) and isinstance(a, Performance):
         return b.equals(a)

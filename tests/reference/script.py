@@ -319,16 +319,13 @@ class Grammar:
             (number, *choices)
             for number, template in enumerate(self.templates)
             for choices in product(
-                *(
-                    range(len(f) if slot == "noun" or f"<{slot}>" in template else 1)
-                    for slot, f in self.fillers.items()
-                )
+                *(range(len(f) if f"<{slot}>" in template else 1) for slot, f in self.fillers.items())
             )
         ]
 
     def meant(self, template: int, *choices: int) -> tuple[int, ...]:
         """The same without choices for slots that the template lacks."""
-        has = (slot == "noun" or f"<{slot}>" in self.templates[template] for slot in self.fillers)
+        has = (f"<{slot}>" in self.templates[template] for slot in self.fillers)
         chosen = zip(choices[: len(self.fillers)], has, strict=True)
         return (template, *(choice if its else 0 for choice, its in chosen))
 

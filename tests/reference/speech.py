@@ -76,11 +76,11 @@ def match(pieces: list[str | AnyOf], text: str, world: World) -> dict[str, Any] 
 
 
 def filled(world: World, grammar: Grammar, template: int, *choices: int) -> dict[str, Any]:
-    """What stands in the slots of a sentence; of a grammar with nouns, in those of each."""
+    """What stands in the slots of a sentence."""
     return {
         slot: meaning(world, fillers[choice])
         for (slot, fillers), choice in zip(grammar.fillers.items(), choices, strict=True)
-        if slot == "noun" or f"<{slot}>" in grammar.templates[template]
+        if f"<{slot}>" in grammar.templates[template]
     }
 
 

@@ -216,11 +216,12 @@ class Recall:
     entries: list[tuple[str, int]] = field(default_factory=list)
     open: bool = False  # at the start of this step
 
-    def equals(self, lesson: Performance) -> bool:
-        """Element by element; false until it is full, or where the lengths differ."""
-        if len(self.entries) < self.size or self.size != len(lesson.elements):
+    def equals(self, other: Performance | Recall) -> bool:
+        """Element by element; false until both are full, or where the lengths differ."""
+        elements = other.entries if isinstance(other, Recall) else other.elements
+        if len(self.entries) < self.size or self.size != len(elements):
             return False
-        return all(self.seen(a) == self.seen(b) for a, b in zip(self.entries, lesson.elements, strict=True))
+        return all(self.seen(a) == self.seen(b) for a, b in zip(self.entries, elements, strict=True))
 
     def seen(self, element: tuple[str, int]) -> Any:
         """What it keeps of an element."""

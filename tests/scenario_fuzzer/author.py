@@ -153,6 +153,7 @@ class _Author:
         said = [
             t.replace("<noun>", str(self.rng.choice(self.declared.nouns))) for t in self.declared.templates
         ]
+        self.declared.templates += ["Hello"] if self.often(0.3) else []
         self.declared.says = [*SAYINGS, *said]
         return {"templates": list(self.declared.templates), "nouns": list(self.declared.nouns)}
 

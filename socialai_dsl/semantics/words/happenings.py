@@ -34,7 +34,7 @@ from socialai_dsl.semantics.terms import (
     where_there_is,
 )
 from socialai_dsl.semantics.words.use import Use, Value
-from socialai_dsl.vocabulary import FINISHED
+from socialai_dsl.vocabulary import FINISHED, NOUN
 
 
 def _said(use: Use) -> Term:
@@ -59,7 +59,7 @@ def _heard(use: Use) -> Term:
 def _noun(use: Use) -> Term:
     must_be_agent(use.resolver, use.node, use.scope)
     texts.no_nouns(use.resolver, use.node, use.scope)
-    return World(use.resolver.symbols.nouns, "noun")
+    return texts.in_slot(use.resolver, NOUN, heard=False)
 
 
 def _action(use: Use) -> Term:
