@@ -717,3 +717,38 @@ def test_who_accepts_on_a_condition_that_finds_nothing_takes_nothing(tmp_path: P
     state = play(tmp_path, text, [STILL] * 5)
     assert state["ann"]["carries"] == "coin"
     assert "carries" not in state["bob"]
+
+
+LIES_IN_NOTHING = """
+objects:
+  boxes: {type: box, count: 2, at: [[2, 2], [4, 4]], color: [red, blue]}
+  ball: {type: ball, at: [3, 3]}
+  coins: {type: ball, count: 2, at: [[5, 1], [5, 2]]}
+cast: {ann: {at: [1, 5], beliefs: {it_in: {start: none, of: ball.inside}}}}
+state:
+  told: {start: none}
+  tally: {for: boxes, start: 0, range: 0..9}
+rules:
+  - {when: t == 2, cause: [ball.move_into(first(b in boxes where b.color == blue))]}
+  - {when: t == 4, cause: [ball.reset]}
+  - {when: ball.inside == first(boxes) or ball.inside != first(boxes), set: {told: ball.inside.color}}
+  - {when: t > 0, set: {tally(ball.inside): tally(ball.inside) + 1}}
+  - {when: any(c in coins where c.inside.color == red), cause: [first(coins).move_into(first(boxes))]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("steps", "told", "counts", "believes"),
+    [
+        (1, "none", [0, 0], "none"),
+        (2, "blue", [0, 1], "none"),
+        (3, "blue", [0, 2], "boxes[1]"),
+        (5, "blue", [0, 2], "boxes[1]"),
+    ],
+)
+def test_what_never_lay_in_anything_is_in_no_box(
+    tmp_path: Path, steps: int, told: str, counts: list[int], believes: str
+) -> None:
+    found = play(tmp_path, LIES_IN_NOTHING, [STILL] * steps)
+    assert found["state"] == {"told": told, "tally": {f"boxes[{k}]": n for k, n in enumerate(counts)}}
+    assert found["ann"]["believes"]["it_in"] == believes

@@ -333,11 +333,13 @@ class Expressions(Emitter):
         return self._found(self._digit(number, digit), digit)
 
     def _container(self, term: terms.FieldOf) -> int:
-        """What a thing lies in: among those that can hold something, even if it never did."""
+        """What a thing lies in, or lay in last; nothing is 0, which fails, or is as good as the first holder."""
         if isinstance(term.entity, Const):
             number = entity_register(term.entity.value, Field.INSIDE)
         else:
             number = self.into_temporary(Op.FIELD, self.value(term.entity), Field.INSIDE)
+        if term.may_miss and self.failed is not None:
+            self.block.test(Op.IF_LE, constant(term.type.low), number, self.failed)
         number = self.into_temporary(Op.MAX, number, constant(term.type.low))
         return self.into_temporary(Op.MIN, number, constant(term.type.high))
 

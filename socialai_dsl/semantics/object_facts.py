@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Literal
 
 from socialai_dsl.diagnostics import advice_on, did_you_mean
 from socialai_dsl.grammar import ast
@@ -103,27 +104,60 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
             if entity in hands.carryable(resolver):
                 hint = "ask who carries it: `ann.carries(x)`; `inside: box` puts it into another object"
             raise resolver.fail("S204", message, node, scope, hint=hint)
+        if scope.at_reset and "object" not in _first_inside(resolver, objects):
+            message = f"`{quoted(node)}`: it lies inside nothing when an episode begins"
+            hint = "`inside: box` puts it into another object; a register or belief may begin empty: `start: none`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
     assert known is not None, "internal: looked at above"
-    return FieldOf(Type("entity", *known), who, "inside")
+    named = filter(None, map(resolver.symbols.object_of, who.type.values))
+    may_miss = not all(_first_inside(resolver, objects) == {"object"} for objects in named)
+    return FieldOf(Type("entity", *known), who, "inside", may_miss)
 
 
 def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
     """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
-    scenario = resolver.symbols.scenario
     if resolver.moved_inside is None:
-        resolver.moved_inside = _moved_inside(scenario)
-    return scenario.objects[objects.name].inside is not None or objects.name in resolver.moved_inside
+        resolver.moved_inside = _moved_inside(resolver.symbols)
+    return "object" in _first_inside(resolver, objects) or objects.name in resolver.moved_inside
 
 
-def _moved_inside(scenario: Scenario) -> set[str]:
-    """All names in what is moved into something, and in what these names stand for."""
+Holding = Literal["object", "member"]
+"""What something is in: an object that it lies in, or the hands of a member of the cast."""
+
+
+def _first_inside(resolver: Resolver, objects: Objects) -> set[Holding]:
+    """What objects of this name may be in at first."""
+    group = resolver.symbols.scenario.objects[objects.name]
+    if group.inside is None:
+        return set()
+    return _holding(resolver.symbols, _nodes(group.inside)) if group.carryable else {"object"}
+
+
+def _holding(symbols: Symbols, nodes: Iterable[ast.Node]) -> set[Holding]:
+    """What an expression that says where something is put may stand for: both, if that is not known."""
+    names = _meant(symbols.scenario, nodes)
+    holders = {name for name, objects in symbols.objects.items() if "opened" in objects.type.states}
+    members = {*symbols.numbers, *symbols.groups, *symbols.roles, "self", "speaker", "cast"}
+    found: set[Holding] = {"object"} if names & {*holders, "objects"} else set()
+    found |= {"member"} if names & members else set()
+    return found or {"object", "member"}
+
+
+def _moved_inside(symbols: Symbols) -> set[str]:
+    """All names in what is moved into objects, and in what these names stand for."""
     subjects = [
         node.subject
-        for effect in _effects(scenario)
+        for effect in _effects(symbols.scenario)
         for node in _nodes(effect)
         if isinstance(node, ast.Call) and node.name == "move_into" and node.subject is not None
+        if "object" in _holding(symbols, (inner for arg in node.args for inner in arg.walk()))
     ]
-    waiting = [node.id for subject in subjects for node in subject.walk() if isinstance(node, ast.Name)]
+    return _meant(symbols.scenario, (node for subject in subjects for node in subject.walk()))
+
+
+def _meant(scenario: Scenario, nodes: Iterable[ast.Node]) -> set[str]:
+    """All names in an expression, and in what these names stand for."""
+    waiting = [node.id for node in nodes if isinstance(node, ast.Name)]
     sources, found = _sources(scenario), set[str]()
     while waiting:
         name = waiting.pop()

@@ -156,6 +156,8 @@ class World:
 class FieldOf:
     """An attribute of an entity: x, y, dir, color, status, gone, poked, last (its last body action), pointing (0, or
     1 + direction), inside (the object it lies in), carrier (0, or 1 + who carries it).
+
+    `may_miss`: of inside, whether it may never have lain in anything.
     """
 
     type: Type
@@ -174,6 +176,7 @@ class FieldOf:
         "toggled",
         "carrier",
     ]
+    may_miss: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -707,7 +710,7 @@ def is_looked_for(part: object) -> bool:
         return part.op in ("first", "pick", "nearest")
     if isinstance(part, Read):
         return part.may_miss or part.nothing is not None
-    return isinstance(part, ReadEach) and part.may_miss
+    return isinstance(part, ReadEach | FieldOf) and part.may_miss
 
 
 def is_own_noun(term: Term) -> bool:

@@ -253,6 +253,8 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
     if name == "inside":
         if context.setup:
             context.setup.compute_inside(subject)
+        if subject.inside is None:
+            raise NothingFoundError
         return subject.inside
     if name == "spoke":
         return subject.utterance is not None

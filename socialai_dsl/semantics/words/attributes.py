@@ -136,7 +136,7 @@ ATTRIBUTES: Final = (
     Value("name", "member", (), "text", "its name, which stands before its lines", meaning=_name),
     Value("kind", "entity", (), "text", "its `kind`; of an object, its type", also=("type",), meaning=_kind),
     Value("index", "entity", (), "number", "its number in its group, from 0", also=("number",), meaning=_index),
-    Value("inside", "object", (), "object", "the object that it lies in, or lay in last",
+    Value("inside", "object", (), "object", "the object that it lies in, or lay in last, if any",
           also=("content", "contains", "in"), meaning=_inside),
     Value("unlocked_by", "object", (), "object", "the object that unlocks it", meaning=_unlocked_by),
     Value("carried", "member", (), "object", "the object in its hands, if any", momentary=True,
