@@ -122,9 +122,9 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
     """The value that the default is, or, where values have labels, stands for."""
     if isinstance(choices, dict) and default in choices.values():
         return default
-    labels = list(map(str, choices)) if isinstance(choices, dict | list) else [str(default)]
-    if str(default) not in labels:
-        advice = advice_on(str(default), labels, "one of " + ", ".join(labels))
+    labels = list(map(_spelt, choices)) if isinstance(choices, dict | list) else [_spelt(default)]
+    if _spelt(default) not in labels:
+        advice = advice_on(_spelt(default), labels, "one of " + ", ".join(labels))
         span = resolved.tree.value_span(("params", name, "default"))
         message = f"the default of `{name}` is none of its values"
         bag.error("S206", message, span, **advice)
@@ -132,27 +132,40 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
 
 
 def _given(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag: DiagnosticBag) -> Data:
-    """The value that was asked for, read as YAML would read it; the default if it cannot be had."""
+    """The value that was asked for: a text, or what YAML would read; the default if it cannot be had."""
     text, span = resolved.params[name], resolved.param_span(name)
     if isinstance(choices, dict):
         if text not in choices:
             advice = advice_on(text, choices, "one of " + ", ".join(choices))
             bag.error("S206", f"`{text}` is none of the values of `{name}`", span, **advice)
         return choices.get(text, default)
+    if isinstance(choices, list):
+        found = [choice for choice in choices if _means(text, choice)]
+        if not found:
+            hint = "one of " + ", ".join(map(_spelt, choices))
+            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, hint=hint)
+        return found[0] if found else default
+    if isinstance(default, str) and text:
+        return text
     value = read_plain(text).value
-    if isinstance(choices, list) and (value not in choices or isinstance(value, bool) != _any_bool(choices)):
-        hint = "one of " + ", ".join(map(str, choices))
-        bag.error("S206", f"`{text}` is none of the values of `{name}`", span, hint=hint)
-        return default
     if choices is None and not _alike(value, default):
-        message = f"`{text}` is not of the kind of the default of `{name}`, `{default}`"
+        message = f"`{text}` is not of the kind of the default of `{name}`, `{_spelt(default)}`"
         bag.error("S206", message, span)
         return default
     return value
 
 
-def _any_bool(choices: list[Data]) -> bool:
-    return any(isinstance(choice, bool) for choice in choices)
+def _means(text: str, choice: Data) -> bool:
+    """Whether a value that was asked for is one of those that there are: that text, or that number or truth value."""
+    if isinstance(choice, str):
+        return text == choice
+    value = read_plain(text).value
+    return _alike(value, choice) and value == choice
+
+
+def _spelt(value: Data) -> str:
+    """A value as YAML spells it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _alike(value: Data, default: Data) -> bool:

@@ -109,3 +109,23 @@ def test_a_parameter_is_one_item_of_a_list_whatever_it_stands_for(tmp_path: Path
     ]
     file.write_text(text.replace("WORDS", "[$n, middling]"), encoding="utf-8")
     assert check(file).diagnostics == ()
+
+
+@pytest.mark.parametrize(
+    ("param", "known"),
+    [
+        ('"5"', ["5", "6.5", "true", "yes", "a b", "010"]),
+        ('{default: "5", values: ["5", "6", "true", "yes"]}', ["5", "6", "true", "yes"]),
+        ("{default: 2, values: [1, 2]}", ["1", "2"]),
+        ("{default: true, values: [true, false]}", ["true", "false"]),
+    ],
+)
+def test_a_value_is_asked_for_as_it_is_spelt(tmp_path: Path, param: str, known: list[str]) -> None:
+    """Also a text that YAML would read as a number, and each value that a finding says there is."""
+    file = tmp_path / "base.yaml"
+    file.write_text(BASE.replace("PARAMS", f"n: 1, one: {param}"), encoding="utf-8")
+    for value in known:
+        assert check(f"{file}?one={value}").diagnostics == ()
+    if "values" in param:
+        (found,) = check(f"{file}?one=none_of_them").diagnostics
+        assert found.hint == "one of " + ", ".join(known)
