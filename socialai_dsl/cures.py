@@ -97,19 +97,23 @@ def added(tree: Node, path: DataPath, text: str) -> TextEdit | None:
     part = tree.get(path)
     if part is None or part.children is None or part.substituted:
         return None
-    last = part.last
-    place = last.end if last is not None else part.span.start + 1
-    if part.is_braced:
-        return part.source.edit(place, place, f", {text}" if last is not None else text)
-    if last is None or last.source != part.source:
+    source, own = part.source, part.own
+    if part.is_braced and not own:
+        blank = not source.text[part.span.start + 1 : part.span.end - 1].strip()
+        return source.edit(part.span.start + 1, part.span.start + 1, text) if blank else None
+    if not own:
         return None
+    last = own[-1]
+    place = last.end
+    if part.is_braced:
+        return source.edit(place, place, f", {text}")
     if last.span.key is not None:
-        return part.source.edit(place, place, f"\n{' ' * (last.span.key.column - 1)}{text}")
-    dash = _before(part.source.text, last.span.start, "-")
+        return source.edit(place, place, f"\n{' ' * (last.span.key.column - 1)}{text}")
+    dash = _before(source.text, last.span.start, "-")
     if dash is None:
         return None
-    indent = dash - part.source.text.rfind("\n", 0, dash) - 1
-    return part.source.edit(place, place, f"\n{' ' * indent}- {text}")
+    indent = dash - source.text.rfind("\n", 0, dash) - 1
+    return source.edit(place, place, f"\n{' ' * indent}- {text}")
 
 
 def deleted(tree: Node, path: DataPath) -> TextEdit | None:
@@ -117,8 +121,10 @@ def deleted(tree: Node, path: DataPath) -> TextEdit | None:
     if not path:
         return None
     part, around = tree.get(path), tree.get(path[:-1])
-    if part is None or around is None or part.span.key is None or part.source != around.source:
+    if part is None or around is None or part.span.key is None or part not in around.own:
         return None
+    if any(len(inner.own) != inner.size for _, inner in part.walk()):
+        return None  # a patch is in it
     if around.size == 1:
         return deleted(tree, path[:-1])
     source, start, end = part.source, part.source.index(part.span.key), part.end

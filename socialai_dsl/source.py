@@ -327,11 +327,22 @@ class Node:
         return 0 if self.children is None else len(self.children)
 
     @property
-    def last(self) -> Node | None:
-        """The last child, if there is one."""
-        if isinstance(self.children, dict):
-            return next(reversed(self.children.values()), None)
-        return self.children[-1] if self.children else None
+    def own(self) -> list[Node]:
+        """The children that are written within this part, in their order there; those of patches and bases are not."""
+        return sorted(
+            (part for _, part in self.items() if self._holds(part)), key=lambda part: part.span.start
+        )
+
+    def _holds(self, part: Node) -> bool:
+        if part.source != self.source:
+            return False
+        key, around = part.span.key, self.span.key
+        start = self.source.index(key) if key is not None else part.span.start
+        if self.is_braced:
+            return self.span.start < start and part.span.end < self.span.end
+        # A patch may make a section of what stands side by side in its `set`.
+        deeper = key is None or around is None or key.column > around.column
+        return self.span.start <= start and deeper
 
     def walk(self, path: DataPath = ()) -> Iterator[tuple[DataPath, Node]]:
         """This part and all below it with their paths, parents first."""
@@ -406,10 +417,8 @@ class Node:
     @property
     def end(self) -> int:
         """The index behind what is written of it in its file."""
-        if isinstance(self.children, dict) and self.children and not self.is_braced:
-            return list(self.children.values())[-1].end
-        if isinstance(self.children, list) and self.children and not self.is_braced:
-            return self.children[-1].end
+        if not self.is_braced and (own := self.own):
+            return own[-1].end
         return self.span.start + len(self.source.text[self.span.start : self.span.end].rstrip())
 
     # -- changes ---------------------------------------------------------------------------------------------

@@ -611,9 +611,10 @@ def _register_of_the_world(resolver: Resolver, path: DataPath, word: str) -> str
         raise resolver.findings.fail("S305", message, span, hint=cure)
     near = did_you_mean(word, scenario.state)
     declaration, places = f"{word}: 0", resolver.findings.places
-    edit = cures.added(places, ("state",), declaration) or cures.added(
-        places, (), f"state: {{{declaration}}}"
-    )
+    if places.get(("state",)) is not None:
+        edit = cures.added(places, ("state",), declaration)
+    else:
+        edit = cures.added(places, (), f"state: {{{declaration}}}")
     hint = cures.propose(f"declare it: `state: {{{declaration}}}`", edit)
     if near or word in resolver.symbols.declared:
         hint = ""

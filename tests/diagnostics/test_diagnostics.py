@@ -196,6 +196,47 @@ def test_a_cure_works(case: str, whole: Path, monkeypatch: pytest.MonkeyPatch) -
         assert new <= REVEALED.get(case, set()), said
 
 
+DECLARES = """\
+scenario: declares
+grammar: {templates: [Hi]}
+room: {size: 6}
+STATE
+cast: {agent: {}}
+rules: [{when: t == 3, set: {a: 1, z: 1}}]
+outcome: [{success: agent.said("Hi") and a + z != 9}]
+"""
+
+
+@pytest.mark.parametrize("state", ["state: {a: 0, z: 0}", "state:\n  a: 0\n  z: 0  # last"])
+@pytest.mark.parametrize(
+    "above",
+    [
+        "variant: above\nof: declares.yaml\nset: {state.b: 1, rules: RULES}",
+        "variant: above\nof: declares.yaml\nset:\n  state.b: 1\n  state.z: 2\n  rules: RULES",
+        "variant: above\nof: declares.yaml\nset: {state.a: 2, state.z: 2, state.b: 1, rules: RULES}",
+        "variant: above\nof: declares.yaml\nset:\n  state: {b: 0, z: 0, a: 0}\n  rules: RULES",
+        "variant: above\nof: declares.yaml\nadd: {state: {b: 1}, rules: RULES}",
+        "scenario: above\nextends: declares.yaml\nstate: {a: 2, b: 1}\nrules: RULES",
+        "scenario: above\nextends: declares.yaml\nstate:\n  b: 1\n  a: 2\nrules: RULES",
+    ],
+)
+def test_a_cure_changes_what_is_written_in_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, above: str
+) -> None:
+    """Parts of a section may come from a patch or a base: what is added to it stands among those of its own file."""
+    monkeypatch.chdir(tmp_path)
+    rules = "[{when: t == 4, set: {a: 1, b: 1, c: 1}}]"
+    Path("declares.yaml").write_text(DECLARES.replace("STATE", state), encoding="utf-8")
+    Path("above.yaml").write_text(above.replace("RULES", rules) + "\n", encoding="utf-8")
+    before = check("above.yaml")
+    (found,) = (one for one in before.diagnostics if one.code == "S305")
+    if not found.edits:
+        assert above.count("state.") == 3, "but for a section of which all is patched"
+        return
+    with followed("above", found, before.sources):
+        assert [str(one) for one in check("above.yaml").diagnostics if one.code != "W317"] == []
+
+
 # -- the pages -----------------------------------------------------------------------------------------------------
 
 PAGES = Path(__file__).parents[2] / "docs" / "diagnostics"
