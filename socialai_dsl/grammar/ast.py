@@ -611,6 +611,8 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         )
     assert isinstance(error, UnexpectedToken), "internal: an unknown kind of lark error"
     token, offset = error.token, error.token.start_pos or 0
+    if token.type == "CMP" and "NAME" in error.expected:  # a value is to come first
+        return ParseProblem("S210", f"something is missing before `{token}`", offset, _BOTH_SIDES)
     if token.type == "CMP" and "CMP" not in error.expected:
         return ParseProblem("S207", "comparisons do not chain", offset, instead=_unchained(text, offset))
     if text.startswith("||", offset - 1):
@@ -630,6 +632,8 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
     return ParseProblem("S210", f"did not expect `{token}` here", offset, hint, words)
 
+
+_BOTH_SIDES = "both sides of a comparison are written out: `t > 3 and t < 5`"
 
 _UNITS = "cells? m steps? turns? rounds? s sec seconds? times? frames? pixels? px episodes?".replace(" ", "|")
 _UNIT = re.compile(rf"(?<![\w.])(\d+) *(?:{_UNITS})\b(?!\s*[.(])")
@@ -698,7 +702,7 @@ _SEVERAL = re.compile(
 _WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to|if|else)\b|[^<>=!()\",\s]+|\s+|.")
 """The pieces of an expression, as far as they say where a comparison begins and ends."""
 
-_COMPARES = frozenset({"==", "!=", "<=", ">=", "<", ">"})
+_COMPARES = frozenset({"in", "==", "!=", "<=", ">=", "<", ">"})
 _BOUNDS = frozenset({"and", "or", "not", "where", "to", "if", "else", ","})
 
 
