@@ -83,6 +83,22 @@ def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Va
     return values
 
 
+def as_asked(resolved: ResolvedFile) -> Data:
+    """The data of a file without mistakes in which each parameter has what was asked for as its default."""
+    declared, data = _declared(resolved), resolved.data
+    assert isinstance(data, dict), "internal: a file is a mapping"
+    given: dict[str, Data] = {}
+    for name in declared.keys() & resolved.params.keys():
+        declaration = declared[name]
+        parts = declaration if isinstance(declaration, dict) else {"default": declaration}
+        choices = parts.get("values")
+        asked: Data = resolved.params[name]
+        if not isinstance(choices, dict):  # else it is a label
+            asked = _given(name, parts["default"], choices, resolved, DiagnosticBag())
+        given[name] = {**declaration, "default": asked} if isinstance(declaration, dict) else asked
+    return {**data, "params": {**declared, **given}} if given else data
+
+
 def _check_values(resolved: ResolvedFile, declared: Container[str], bag: DiagnosticBag) -> None:
     """Report values of parameters, written in the file or behind `?`, that name parameters themselves."""
     params = resolved.tree.entry("params")

@@ -31,6 +31,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
         print(socialai_dsl.compile(socialai_dsl.load(arguments.scenario)).listing())
         return Exit.GOOD
+    from socialai_dsl.checking.scenarios import as_asked
     from socialai_dsl.frontend import check
     from socialai_dsl.semantics.scope import dotted
 
@@ -41,5 +42,5 @@ def execute(arguments: argparse.Namespace) -> Exit:
     else:
         import yaml
 
-        print(yaml.safe_dump(resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
+        print(yaml.safe_dump(as_asked(resolved), sort_keys=False, allow_unicode=True, width=100), end="")
     return Exit.GOOD

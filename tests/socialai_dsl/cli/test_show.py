@@ -1,5 +1,6 @@
 """`socialai show`: the resolved scenario, its origins, its program."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -36,6 +37,40 @@ def test_what_is_shown_is_a_scenario_again(scenario: str, capsys: Capture) -> No
     assert main(["show", scenario]) == 0
     Path("again.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
     assert main(["validate", "--strict", "again.yaml"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("asked", "defaults"),
+    [
+        ("n=2", {"n": 2}),
+        ("word=5&flag=false", {"word": "5", "flag": False}),
+        ("wall=left", {"wall": "left"}),
+        ("side=right", {"side": "right"}),
+    ],
+)
+def test_what_is_shown_has_the_parameters_that_were_asked_for(
+    asked: str, defaults: dict[str, object], scenario: str, capsys: Capture
+) -> None:
+    """So what is shown plays as that name does."""
+    params = {
+        "n": 1,
+        "word": "Hello",
+        "flag": True,
+        "wall": {"default": "top", "values": {"top": "wall(top)", "left": "wall(left)"}},
+        "side": {"default": "left", "values": ["left", "right"]},
+    }
+    Path("asked.yaml").write_text(
+        f"scenario: asked\nextends: corridor.yaml\nparams: {json.dumps(params)}\n", encoding="utf-8"
+    )
+    capsys.readouterr()
+    assert main(["show", f"asked.yaml?{asked}"]) == 0
+    Path("again.yaml").write_text(shown := capsys.readouterr().out, encoding="utf-8")
+    assert main(["validate", "again.yaml"]) == 0
+    found = {
+        name: value["default"] if isinstance(value, dict) else value
+        for name, value in yaml.safe_load(shown)["params"].items()
+    }
+    assert found == {"n": 1, "word": "Hello", "flag": True, "wall": "top", "side": "left"} | defaults
 
 
 def test_origins_name_the_file_of_each_value(scenario: str, capsys: Capture) -> None:
