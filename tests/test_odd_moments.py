@@ -752,3 +752,30 @@ def test_what_never_lay_in_anything_is_in_no_box(
     found = play(tmp_path, LIES_IN_NOTHING, [STILL] * steps)
     assert found["state"] == {"told": told, "tally": {f"boxes[{k}]": n for k, n in enumerate(counts)}}
     assert found["ann"]["believes"]["it_in"] == believes
+
+
+BELOW_ZERO = """
+grammar: {templates: [Take <n>], slots: {n: -2..2}}
+actions: [left, right, forward]
+memory: {odd: {last: 2, while: t % 2 == 1}, latest: {last: 2}}
+state: {sum: {for: -2..2, start: it * 10, range: -99..99}, same: 0}
+frames:
+  listen:
+    states: {s: {then: [{hears: Take <n>, when: n < 1, set: {sum(those(k in -2..2 where k <= n)): sum(k) - n}}]}}
+cast: {ann: {at: [5, 5], frame: listen}}
+rules: [{when: odd == latest, set: {same: same + 1}}]
+outcome: [{failure: t == 9}]
+"""
+
+
+def test_numbers_below_zero_are_heard_and_memories_compared_once_both_are_full(tmp_path: Path) -> None:
+    acts = [
+        ("left", "Take -2"),
+        ("left", "Take -1"),
+        ("left", "Take -1"),
+        ("left", "Take -1"),
+        (None, "Take 2"),
+    ]
+    found = play(tmp_path, BELOW_ZERO, acts)["state"]
+    assert found["sum"] == {"-2": -15, "-1": -7, "0": 0, "1": 10, "2": 20}
+    assert found["same"] == 1

@@ -22,7 +22,7 @@ class AnyOf:
 
 def noun_value(noun: str | int) -> str | int:
     """A noun that is a number has that value."""
-    return int(noun) if str(noun).isdigit() else str(noun)
+    return int(noun) if re.fullmatch("-?[0-9]+", str(noun)) else str(noun)
 
 
 def noun_values(world: World) -> list[str | int]:
