@@ -17,7 +17,7 @@ from tests.agreement import Pair, questions_agree
 from tests.quick import one_in
 from tests.reference.interpreter import Reference
 from tests.reference.vocabulary import LONGEST, Words
-from tests.scenario_fuzzer import write, write_asking
+from tests.scenario_fuzzer import write, write_asking, write_furnished
 
 
 def compare(folder: Path, seed: int, episodes: int) -> int:
@@ -43,6 +43,31 @@ def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
 def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
         compare(tmp_path, seed, episodes=2)
+
+
+def compare_furnished(folder: Path, seed: int, episodes: int) -> int:
+    """The same of a scenario in several files, with more keys; the number of steps."""
+    for name, text in write_furnished(seed).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    pair = Pair.of(load(str(folder / f"random_{seed}.yaml")), number_words=False)
+    rng = np.random.default_rng(seed)
+    return sum(pair.play(seed, episode, rng) for episode in range(episodes))
+
+
+@pytest.mark.parametrize(
+    "first", one_in(3, range(50_000, 50_060, 10), "plays random scenarios on the slow interpreter")
+)
+def test_random_scenarios_of_several_files_agree(tmp_path: Path, first: int) -> None:
+    steps = [compare_furnished(tmp_path, seed, episodes=2) for seed in range(first, first + 10)]
+    assert sum(steps) > 10 * 10, "the episodes were too short to mean anything"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("first", range(50_000, 53_000, 500))
+def test_three_thousand_random_scenarios_of_several_files_agree(tmp_path: Path, first: int) -> None:
+    for seed in range(first, first + 500):
+        compare_furnished(tmp_path, seed, episodes=2)
 
 
 def compare_questions(folder: Path, seed: int) -> int:
@@ -192,8 +217,19 @@ SPOKEN_OF = (
 """What authors can write, and what the random scenarios of the ordinary suite are to contain."""
 
 
+SPOKEN_OF_IN_SEVERAL_FILES = (
+    *("npc: ", "one_of:", "roles:", "role: ", "npc_defaults:", "params:", "values:", "$late", "$there"),
+    *("  at:", "name: ", "kind_code:", "width:", "height:", "pressed:", "opened:", "unlocked_by"),
+    *("top_half", "bottom_half", "nowhere", "toward(agent)", "for: ever"),
+)
+"""What is added where a scenario is written in several files."""
+
+
 def test_random_scenarios_speak_of_most_of_the_language() -> None:
     texts = [write(seed) for seed in range(200)]
     missing = [word for word in SPOKEN_OF if not any(word in text for text in texts)]
+    assert not missing
+    files = [file for seed in range(50_000, 50_060) for file in write_furnished(seed).values()]
+    missing = [word for word in SPOKEN_OF_IN_SEVERAL_FILES if not any(word in text for text in files)]
     assert not missing
     assert all(re.match(r"scenario: random_\d+\n", text) for text in texts)

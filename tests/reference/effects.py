@@ -230,7 +230,7 @@ def remember(entity: Entity) -> None:
 
 
 def reset(world: World, target: Entity) -> None:
-    """As it was put down in this episode; an NPC turns back, and goes back if its place is free."""
+    """As it was put down in this episode; an NPC turns back, and goes back if its place is free, or out of the room."""
     status, cell, facing, inside, carrier = target.at_reset
     if target.sort == "object":
         target.status, target.inside, target.counted = status, inside, 0
@@ -241,7 +241,10 @@ def reset(world: World, target: Entity) -> None:
             content.cell, content.carrier, content.inside = None, None, target
     else:
         target.pointing, target.facing = None, facing
-        if cell is None or not geometry.free(world, cell, target):
+        if cell is None:
+            vanish(target)
+            return
+        if not geometry.free(world, cell, target):
             return
     target.cell, target.facing = cell, facing
 

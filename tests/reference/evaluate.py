@@ -271,6 +271,8 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
     if name in ("kind", "index", "gone", "poked", "was_poked", "action", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":
+        for thing in context.world.things() if context.setup else ():
+            context.setup.compute_links(thing)
         found = [thing for thing in context.world.things() if subject in thing.unlocks]
         return found[0] if len(found) == 1 else found
     if subject.sort == "object":

@@ -11,6 +11,7 @@ import yaml
 
 from tests.scenario_fuzzer.behaviour import Behaviour
 from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Look, Row, Thing
+from tests.scenario_fuzzer.furnish import furnish
 from tests.scenario_fuzzer.phrases import COLORS, Phrases, Where
 from tests.scenario_fuzzer.seats import entries, give_seats
 
@@ -62,6 +63,16 @@ def write_seated(seed: int) -> str:
     """The same scenario with seats for some of its cast."""
     made = give_seats(_Author(Random(seed)).scenario(f"random_{seed}"), Random(f"seats of {seed}"))
     return yaml.safe_dump(made, sort_keys=False, width=110, allow_unicode=True)
+
+
+def write_furnished(seed: int) -> dict[str, str]:
+    """The same scenario with more keys of the language, and files of its members: name of a file -> text."""
+    made = _Author(Random(seed)).scenario(f"random_{seed}")
+    files = furnish(made, Random(f"furniture of {seed}"))
+    return {
+        name or f"random_{seed}.yaml": yaml.safe_dump(file, sort_keys=False, width=110, allow_unicode=True)
+        for name, file in files.items()
+    }
 
 
 class _Author:
