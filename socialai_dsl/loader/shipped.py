@@ -1,7 +1,7 @@
 """Which scenarios ship, and which of the other files are only variants of them."""
 
 import posixpath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -138,15 +138,16 @@ def variants_of(scenario: str) -> list[str]:
     return list(dict.fromkeys([*own, *near, *_of_any("")]))
 
 
-def _of_any(folder: str) -> list[str]:
+@cache
+def _of_any(folder: str) -> Sequence[str]:
     """The variants in a folder that are of any scenario, without those whose names say for which one they are."""
-    return [
+    return tuple(
         name
         for name in _documents()
         if posixpath.dirname(name) == folder
         and _base(name) == "any"
         and not any(name.startswith(f"{other}_") for other in _documents())
-    ]
+    )
 
 
 @cache
