@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
+
+import numpy as np
 
 MOST_EPISODES: Final = 1_000_000
 """The most test episodes of an evaluation: more than anybody waits for, few enough that their results fit in memory."""
@@ -26,6 +29,53 @@ def wilson(rate: float, trials: float) -> tuple[float, float]:
     half = math.sqrt(rate * (1 - rate) * spread + spread * spread / 4) / (1 + spread)
     # At the ends the formula gives 0 and 1 but for rounding.
     return (0.0 if rate == 0 else centre - half), (1.0 if rate == 1 else centre + half)
+
+
+def effective_trials(successes: Sequence[float], trials: Sequence[float]) -> float:
+    """How many independent trials tell as much as trials that come in clusters, such as those of a person or a session.
+
+    p (1 - p) over the variance of the ratio estimator between clusters, times (t of all trials / t of the clusters)
+    squared for the degrees of freedom (Korn and Graubard 1998; with Wilson's interval: Franco, Little, Louis and Slud
+    2019). There are never more than there are trials. Where all trials ended alike, so that no variance is known, each
+    cluster counts once; so does a single one. Clusters of one trial each are trials.
+
+    Args:
+        successes: of each cluster.
+        trials: of each cluster, at least one.
+
+    Raises:
+        ValueError: there is no cluster, or there are not as many on both sides.
+    """
+    won, played = np.asarray(successes, np.float64), np.asarray(trials, np.float64)
+    if len(won) != len(played) or not len(won):
+        raise ValueError(f"got {len(won)} and {len(played)} clusters, expected as many, at least one")
+    clusters, total = len(won), float(played.sum())
+    rate = float(won.sum()) / total
+    if total == clusters or clusters == 1 or rate in (0, 1):
+        return float(clusters)
+    variance = clusters / (clusters - 1) * float(((won - rate * played) ** 2).sum()) / total**2
+    if not variance:
+        return total
+    freedom = (_quantile_of_t(round(total) - 1) / _quantile_of_t(clusters - 1)) ** 2
+    return min(total, rate * (1 - rate) / variance * freedom)
+
+
+def _quantile_of_t(freedom: int) -> float:
+    """The two-sided 95 % quantile of Student's t: the probability is a finite sum (Abramowitz and Stegun 26.7.3, 4)."""
+    low, high = 0.0, math.pi / 2
+    for _ in range(53):
+        angle = (low + high) / 2
+        cosine, term, total = math.cos(angle), 1.0, 0.0
+        for k in range(2 + freedom % 2, freedom + 1, 2):
+            total += term
+            term *= (k - 1) / k * cosine * cosine
+        if freedom % 2:
+            total *= math.cos(angle)
+            inside = 2 / math.pi * (angle + math.sin(angle) * total)
+        else:
+            inside = math.sin(angle) * total
+        low, high = (angle, high) if inside < 0.95 else (low, angle)
+    return math.sqrt(freedom) * math.tan(low)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.baselines import wilson
+from socialai_dsl.baselines import effective_trials, wilson
 from socialai_dsl.episodes.play import Observer, Rooms, Step
 
 
@@ -68,6 +68,7 @@ class EvalResult:
         names: the scenario's outcomes.
         rules: mean number of times that each rule of the scenario fired in an episode.
         others: of each seat but the first whether an episode was its success, bool (N,), and its return, float64 (N,).
+        session: how many episodes in a row may be alike, since draws stay the same or the policy remembers them.
     """
 
     success: NDArray[np.bool_]
@@ -77,6 +78,7 @@ class EvalResult:
     names: tuple[str, ...]
     rules: Mapping[str, float] = field(default_factory=dict)
     others: Mapping[str, tuple[NDArray[np.bool_], NDArray[np.float64]]] = field(default_factory=dict)
+    session: int = 1
 
     @property
     def episodes(self) -> int:
@@ -102,13 +104,31 @@ class EvalResult:
 
     @property
     def success_rate_se(self) -> float:
-        """The binomial standard error of `success_rate`."""
-        return math.sqrt(self.success_rate * (1 - self.success_rate) / self.episodes)
+        """The standard error of `success_rate`: the binomial one, of sessions with the effective number of episodes."""
+        return math.sqrt(self.success_rate * (1 - self.success_rate) / self._effective(self.success))
 
     @property
     def success_interval(self) -> tuple[float, float]:
-        """The 95 % confidence interval of `success_rate` by `wilson_interval`."""
-        return wilson_interval(int(self.success.sum()), self.episodes)
+        """The 95 % confidence interval of `success_rate`, see `interval`."""
+        return self.interval(self.success)
+
+    def interval(
+        self, success: NDArray[np.bool_], numbers: NDArray[np.int64] | None = None
+    ) -> tuple[float, float]:
+        """The 95 % confidence interval of a rate: Wilson's, of sessions with the effective number of episodes.
+
+        Args:
+            success: bool (M,), at least one.
+            numbers: int64 (M,), of which episodes; None: of the first M.
+        """
+        return wilson(float(success.mean()), self._effective(success, numbers))
+
+    def _effective(self, success: NDArray[np.bool_], numbers: NDArray[np.int64] | None = None) -> float:
+        """See `baselines.effective_trials`; the clusters are sessions."""
+        sessions = (np.arange(len(success)) if numbers is None else numbers) // self.session
+        played = np.bincount(sessions)
+        won = np.bincount(sessions, success)
+        return effective_trials(won[played > 0].tolist(), played[played > 0].tolist())
 
     @property
     def mean_length(self) -> float:
@@ -155,8 +175,10 @@ class Results(Observer):
             returns[step.numbers[step.running]] += reward[step.running]
             won[step.numbers[step.ended]] = success[step.ended]
 
-    def result(self, rules: Mapping[str, float] | None = None) -> EvalResult:
+    def result(self, rules: Mapping[str, float] | None = None, session: int = 1) -> EvalResult:
         """The results of all N episodes, with the mean number of times that each rule fired.
+
+        `session`: see `EvalResult`.
 
         Raises:
             ValueError: an episode has not ended, since its policy stopped playing.
@@ -167,9 +189,8 @@ class Results(Observer):
                 f"policy: it stopped playing before the end of {left} of the {len(self._outcome)} episodes; expected "
                 "an action in every step"
             )
-        return EvalResult(
-            self._success, self._outcome, self._lengths, self._returns, self._names, rules or {}, self._others
-        )
+        ended = self._success, self._outcome, self._lengths, self._returns
+        return EvalResult(*ended, self._names, rules or {}, self._others, session)
 
 
 class Actions(Observer):

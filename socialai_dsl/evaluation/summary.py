@@ -18,7 +18,7 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     rooms = figures.get("rooms", _TEST)  # older results know of no others
     manner = f", {figures['actions']}" if figures["actions"] else ""
     rows = [
-        ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} (Wilson)"),
+        ("success", f"{figures['success_rate']:.1%}, 95% interval {_interval(figures)} {_by(figures)}"),
         ("episodes", f"{figures['episodes']} {_of_rooms(rooms)}{manner}"),
         ("mean length", f"{figures['mean_length']:.1f} steps"),
         ("mean return", f"{figures['mean_return']:.3f}"),
@@ -52,6 +52,12 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     if figures.get("unsolved"):
         rows.append(("unsolved", _numbers(figures["unsolved"], rooms)))
     return rows
+
+
+def _by(figures: Mapping[str, Any]) -> str:
+    """How the interval was found."""
+    session = figures.get("session", 1)
+    return "(Wilson)" if session == 1 else f"(Wilson, over sessions of {session} episodes)"
 
 
 def _interval(figures: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from math import lcm
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -217,17 +218,24 @@ class Evaluation:
             "endings": [ending.figures(shares[ending.name], result.episodes) for ending in self.endings],
             "rules": dict(result.rules),
         }
+        if result.session > 1:
+            figures["session"] = result.session
         if self.trials > 1:
-            figures["trials"] = [_some_of(*counts) for counts in result.by_trial(self.trials)]
+            figures["trials"] = [
+                _some_of(won, played, wilson_interval(won, played))
+                for won, played in result.by_trial(self.trials)
+            ]
         if result.others:
             figures["seats"] = {
-                seat: _some_of(int(won.sum()), len(won)) for seat, (won, _) in result.others.items()
+                seat: _some_of(int(won.sum()), len(won), result.interval(won))
+                for seat, (won, _) in result.others.items()
             }
         figures |= {**_by_member(self.program, shares), **self.more}
         apart = of_rooms(self.loaded, self.program, self.rooms.reset, result.episodes)
         for (draw, value), numbers in apart.items():
-            won = int(result.success[numbers].sum())
-            figures.setdefault("results_by", {}).setdefault(draw, {})[value] = _some_of(won, len(numbers))
+            success = result.success[numbers]
+            some = _some_of(int(success.sum()), len(success), result.interval(success, np.asarray(numbers)))
+            figures.setdefault("results_by", {}).setdefault(draw, {})[value] = some
         if self.player.is_script:
             # A room that the script does not solve is worth looking at: it can be played again by its number.
             figures["unsolved"] = (~result.success).nonzero()[0].tolist()
@@ -342,10 +350,12 @@ def play_test_set(
         place = models[0].kept_in
         played = let_models_play(players, own, scenario, loaded, program, episodes, place, trials, room_set)
         found = _of_models(played, scenario, loaded, program, player, partners, briefing)
-        return replace(found, trials=trials, rooms=room_set)
+        alike = replace(found.result, session=_alike(player, program, trials))
+        return replace(found, result=alike, trials=trials, rooms=room_set)
     kept = Actions()
     with _playing(player, partners, scenario, loaded, program, -(-episodes // trials)) as playing:
-        result = _result_of(playing, episodes, [kept, *observers], trials, room_set)
+        session = _alike(player, program, trials)
+        result = _result_of(playing, episodes, session, [kept, *observers], trials, room_set)
     told = playing.told
     found = Evaluation(scenario, loaded, program, player, result, endings, kept.played, told)
     return replace(found, trials=trials, seat=own, partners=partners, rooms=room_set)
@@ -488,17 +498,24 @@ def evaluate_policy(
     players = policy if isinstance(policy, Mapping) else {AGENT: policy}
     if episodes >= 1 and (not 1 <= trials <= episodes or episodes % trials):
         raise ValueError(f"trials: got {trials}, expected a divisor of the {episodes} episodes")
-    return _result_of(Company(envs, players, envs.seat_names[0]), episodes, observers, trials)
+    session = lcm(envs.program.session, trials)
+    return _result_of(Company(envs, players, envs.seat_names[0]), episodes, session, observers, trials)
+
+
+def _alike(player: Player, program: Playable, trials: int) -> int:
+    """How many episodes in a row may be alike, see `EvalResult.session`."""
+    return lcm(program.session, trials if player.kind in ("network", "model", "policy") else 1)
 
 
 def _result_of(
     playing: Company,
     episodes: int,
+    session: int,
     observers: Sequence[Observer] = (),
     trials: int = 1,
     room_set: RoomSet = TEST_ROOMS,
 ) -> EvalResult:
-    """See `evaluate_policy`."""
+    """See `evaluate_policy`; `session`: see `EvalResult`."""
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")
     envs = playing.envs
@@ -507,7 +524,7 @@ def _result_of(
     rooms = Rooms(envs, [results, *observers], playing.own, playing.scripts)
     play(rooms, playing.policies, EachRoom(episodes, trials, rooms=room_set))
     fired = {name: (n - before.get(name, 0)) / episodes for name, n in envs.counters()["rules"].items()}
-    return results.result(fired)
+    return results.result(fired, session)
 
 
 def evaluation_of_person(run: Path, scenario: str, most: int) -> Evaluation:
@@ -553,6 +570,7 @@ def _of_person(
         np.array([len(p.actions) for p in played]),
         np.array([p.reward for p in played]),
         names,
+        session=program.session,
     )
     actions = {number: _of_all_seats(p, own, program) for number, p in enumerate(played)}
     endings = endings_of(loaded, program)
@@ -573,10 +591,9 @@ def _of_all_seats(played: "FinishedEpisode", own: Seat, program: Playable) -> li
     return [np.stack(step) for step in zip(*(done.get(seat, still) for seat in seats), strict=True)]
 
 
-def _some_of(successes: int, episodes: int) -> dict[str, Any]:
+def _some_of(successes: int, episodes: int, interval: tuple[float, float]) -> dict[str, Any]:
     """What came of some of the episodes: of one trial, or with one value of a draw."""
-    interval = list(wilson_interval(successes, episodes))
-    return {"episodes": episodes, "success_rate": successes / episodes, "success_interval": interval}
+    return {"episodes": episodes, "success_rate": successes / episodes, "success_interval": list(interval)}
 
 
 def _by_member(program: Playable, shares: Mapping[str, float]) -> dict[str, Any]:

@@ -381,6 +381,7 @@ def _read_run(folder: Path, name: str, seed: int) -> RunRecord:
     result = _read(folder / RESULT, _RESULT, problems)
     settings = _settings(folder, problems)
     frames = result.frames if result is not None else _frames_so_far(folder / METRICS, problems)
+    trials, session = (1, 1) if result is None else (result.trials, result.session)
     return RunRecord(
         name,
         seed,
@@ -388,7 +389,7 @@ def _read_run(folder: Path, name: str, seed: int) -> RunRecord:
         _state(folder, status, result, frames),
         message=(status.message or "") if status is not None else "",
         result=result,
-        episodes=read_episodes(folder, result.trials if result is not None else 1, problems),
+        episodes=read_episodes(folder, trials, session, problems),
         answers=read_answers(folder, problems),
         tests=_read(folder / TESTS, _TESTS, problems) or {},
         frames=frames,

@@ -30,12 +30,13 @@ def table_of(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> pd.DataFr
     return pd.DataFrame(list(rows), columns=list(columns))
 
 
-def read_episodes(folder: Path, trials: int, problems: list[str]) -> pd.DataFrame:
+def read_episodes(folder: Path, trials: int, session: int, problems: list[str]) -> pd.DataFrame:
     """The test episodes that a run lists, in `EPISODE_COLUMNS`; none where it lists none.
 
     Args:
         folder: of the run.
         trials: how many episodes in a row its player remembered.
+        session: how many in a row may be alike.
         problems: gets what is wrong with the list, in words.
     """
 
@@ -48,7 +49,7 @@ def read_episodes(folder: Path, trials: int, problems: list[str]) -> pd.DataFram
                 "episode": table.episode,
                 "room": table.episode,
                 "trial": table.episode % trials + 1,
-                "cluster": (table.episode // trials).astype(str),
+                "cluster": (table.episode // session).astype(str),
                 "success": table.success,
                 "outcome": known.outcome,
                 "steps": pd.to_numeric(known.length),

@@ -61,7 +61,7 @@ class Mind:
         condition: what it is. kind: of mind, as results say it; empty where none does.
         episodes: those of all its runs, with `run`, the place of the run. answers: likewise. reactions: likewise.
         of: what the episodes come in: `people`, those who play together as one; `seeds` of an agent that has learned;
-            `sessions` that are remembered; or nothing, `episodes`.
+            `sessions` that are remembered, or have the same draws; or nothing, `episodes`.
     """
 
     def __init__(self, condition: Condition) -> None:
@@ -72,7 +72,7 @@ class Mind:
         self.episodes = _together(runs, "episodes", NO_EPISODES)
         self.answers = _together(runs, "answers", NO_ANSWERS)
         self.reactions = _together(runs, "reactions", NO_REACTIONS)
-        self.of = _come_in(self.kind, len(runs), int(self.episodes.trial.max()) if len(self.episodes) else 1)
+        self.of = _come_in(self.kind, len(runs), max((result.session for result in results), default=1))
         if not condition.study:  # else the lists say who played together
             place = self.episodes.run.astype(str)
             within = {"sessions": "cluster", "episodes": "episode"}.get(self.of)
@@ -153,14 +153,13 @@ class Mind:
                 yield {"trial": int(trial), **_quartiles(some.ms)}
 
 
-def _come_in(kind: str, runs: int, trials: int) -> str:
+def _come_in(kind: str, runs: int, session: int) -> str:
     """What the episodes of a kind of mind come in, see `Mind.of`."""
     if kind == "person":
         return "people"
     if kind in ("network", "") and runs > 1:
         return "seeds"
-    # Scripts, rivals and chance remember nothing, whatever they are granted.
-    return "episodes" if trials == 1 or kind in ("script", "rival", "chance") else "sessions"
+    return "episodes" if session == 1 else "sessions"
 
 
 def _together(runs: Sequence[RunRecord], name: str, nothing: pd.DataFrame) -> pd.DataFrame:

@@ -44,6 +44,7 @@ class Figures(Record):
     Attributes:
         rooms: `test` of the test set, or which others, such as `seed:7`.
         actions: how they came about, in a phrase.
+        session: how many episodes in a row may be alike; None where an older version wrote it.
         trials: in order, where players remembered several episodes in a row.
         results_by: draw -> value -> what came of the episodes with it.
         seats: of several seats, each but the player's own -> what came of the episodes for it.
@@ -67,6 +68,7 @@ class Figures(Record):
     tokens_estimated: bool = False
     cost: float | None = Field(None, ge=0)
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
+    session: int | None = Field(None, ge=1)
     trials: list[PartFigures] = Field(default_factory=list)
     results_by: dict[str, dict[str, PartFigures]] = Field(default_factory=dict)
     seats: dict[str, PartFigures] = Field(default_factory=dict)
@@ -105,6 +107,12 @@ class ResultRecord(Record):
     eval: Figures
     program_sha256: str = ""
     versions: dict[str, str] = Field(default_factory=dict)
+
+    @property
+    def session(self) -> int:
+        """How many episodes in a row may be alike, since draws stay the same or the player remembers them."""
+        remembered = 1 if self.kind in ("script", "rival", "chance") else self.trials
+        return self.eval.session or remembered
 
     @property
     def by_seat(self) -> dict[str, PartFigures]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import gammaln
 
-from socialai_dsl.baselines import wilson
+from socialai_dsl.baselines import effective_trials, wilson
 
 Float = NDArray[np.float64]
 
@@ -190,11 +190,7 @@ def paired_difference(first: Sequence[float], second: Sequence[float]) -> Estima
 def clustered_rate(successes: Sequence[float], episodes: Sequence[float]) -> Estimate | None:
     """A success rate with its interval where episodes come in clusters, such as those of a person; None of one cluster.
 
-    It is Wilson's interval with the effective number of episodes in place of their number: p (1 - p) over the variance
-    of the ratio estimator between clusters, times (t of all episodes / t of the clusters) squared for the degrees of
-    freedom (Korn and Graubard 1998; with Wilson's interval: Franco, Little, Louis and Slud 2019). There are never more
-    than there are episodes. Where all episodes ended alike, so that no variance is known, each cluster counts once.
-    Of clusters of one episode each it is Wilson's interval.
+    It is Wilson's interval with the effective number of episodes, see `baselines.effective_trials`.
 
     Args:
         successes: of each cluster.
@@ -203,23 +199,11 @@ def clustered_rate(successes: Sequence[float], episodes: Sequence[float]) -> Est
     Raises:
         ValueError: there is no cluster, or there are not as many on both sides.
     """
-    won, played = np.asarray(successes, np.float64), np.asarray(episodes, np.float64)
-    if len(won) != len(played) or not len(won):
-        raise ValueError(f"got {len(won)} and {len(played)} clusters, expected as many, at least one")
-    clusters, total = len(won), played.sum()
-    rate = float(won.sum() / total)
-    if clusters < 2:
+    effective = effective_trials(successes, episodes)
+    if len(episodes) < 2:
         return None
-    effective = float(total)
-    if total > clusters:
-        effective = float(clusters)
-        variance = clusters / (clusters - 1) * float(((won - rate * played) ** 2).sum()) / total**2
-        if 0 < rate < 1:
-            quantile = (1 + LEVEL) / 2
-            freedom = (stats.t.ppf(quantile, total - 1) / stats.t.ppf(quantile, clusters - 1)) ** 2
-            effective = min(total, rate * (1 - rate) / variance * freedom) if variance else total
-    low, high = wilson(rate, effective)
-    return Estimate(rate, low, high)
+    rate = sum(successes) / sum(episodes)
+    return Estimate(rate, *wilson(rate, effective))
 
 
 def frames_to(frames: Float, success: Float, threshold: float) -> float | None:

@@ -67,6 +67,7 @@ class EchoEnvs(gym.vector.VectorEnv):
             outcomes=["right", "left", "time_out"],
             vocabulary=self.vocabulary,
             sha256="0" * 64,
+            session=1,
             actions=("stop", "wait", "look"),
             templates=("ask <noun>", "say <noun>"),
             nouns=tuple(f"word{i}" for i in range(nouns)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.draws import TEST_DOMAIN, below, draw, episode_key, site
+from socialai_dsl.episodes.results import wilson_interval
 from socialai_dsl.errors import OptionError
+from socialai_dsl.evaluation.summary import summary_rows
 from socialai_dsl.frontend import check
 
 BOXES = Path(__file__).parents[2] / "data" / "agreement" / "sessions.yaml"
+STRANGER = Path(__file__).parents[3] / "experiments" / "sessions" / "stranger.yaml"
 KEPT = ("secret", "mood", "dance")
 
 
@@ -97,6 +101,31 @@ def test_players_remember_a_session_unless_asked_otherwise() -> None:
             [one["episodes"] for one in played.figures().get("trials", [])],
         )
     assert found == {None: (4, 3, [4, 3, 3]), 1: (10, 1, []), 5: (2, 5, [2] * 5)}
+
+
+class Asker:
+    """Asks the stranger in each step, who shares in all episodes of a session or in none."""
+
+    def act(self, observations: dict[str, Any]) -> Any:
+        return np.tile([0, 1, 0, 0], (len(observations["image"]), 1))
+
+    def reset(self, mask: Any = None, numbers: Any = None) -> None:
+        """It remembers nothing."""
+
+
+def test_an_interval_counts_sessions_whose_episodes_are_alike() -> None:
+    """Each of a hundred sessions counts once, also for a player that remembers nothing."""
+    played = sd.evaluate(Asker(), str(STRANGER), 500)
+    won = int(played.result.success.sum())
+    assert 0 < won < 500
+    assert won % 5 == 0
+    assert played.result.success_interval == pytest.approx(wilson_interval(won // 5, 100), abs=0.003)
+    figures = played.figures()
+    assert figures["session"] == 5
+    assert figures["success_rate_se"] == pytest.approx((won / 500 * (1 - won / 500) / 100) ** 0.5, rel=0.03)
+    assert figures["trials"][0]["success_interval"] == list(wilson_interval(won // 5, 100))
+    assert "over sessions of 5 episodes" in dict(summary_rows(figures))["success"]
+    assert replace(played.result, session=1).success_interval == wilson_interval(won, 500)
 
 
 @pytest.mark.parametrize("episodes", [1, 2, 4])

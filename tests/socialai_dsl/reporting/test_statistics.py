@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
+from socialai_dsl.baselines import _quantile_of_t
 from socialai_dsl.episodes.results import wilson_interval
 from socialai_dsl.reporting.statistics import (
     area_under,
@@ -149,6 +151,11 @@ def test_an_interval_over_people_holds_their_rate_and_is_one_of_rates(people: li
     low, high = wilson_interval(sum(won), sum(played))
     assert found.low <= low + 1e-9, "never narrower than if all episodes were of different people"
     assert found.high >= high - 1e-9
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 7, 30, 99, 499, 4999])
+def test_students_quantile_is_that_of_scipy(freedom: int) -> None:
+    assert _quantile_of_t(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-9)
 
 
 def test_people_who_are_always_alike_count_as_people_and_not_as_episodes() -> None:
