@@ -126,7 +126,8 @@ EFFECTS: Final = (
     Change("unlock", "object", doc="if it is locked, it becomes closed, a box shut", needs="locked"),
     Change("reset", "entity",
            doc="an object has its first status, place and content again, its timer at 0; an NPC its first "
-               "place, if that is free, and direction, and points no longer; who began `gone` is gone again", meaning=_reset),
+               "place, if that is free, and direction, and points no longer; who began `gone` is gone again",
+           meaning=_reset),
     Change("vanish", "entity", doc="an object or an NPC leaves the room: it is `gone`", takes_away=True,
            meaning=_vanish),
     Change("reveal", "object", doc="it becomes opened, and its content takes its place", makes="opened"),
