@@ -303,7 +303,9 @@ def pair_by_room(first: Summary, second: Summary) -> dict[str, Any] | None:
     if len(played) != 1 or rooms.empty:
         return None
     here, there = rooms.iloc[:, 0], rooms.iloc[:, 1]
-    difference = paired_difference(here, there)
+    # Episodes of a session are not independent, so each session counts once.
+    alike = rooms.groupby(rooms.index // max(result.session for result in results)).mean()
+    difference = paired_difference(alike.iloc[:, 0], alike.iloc[:, 1])
     return {
         "group": first.condition.entry.group,
         "first": first.name,

@@ -111,8 +111,8 @@ class ResultRecord(Record):
     @property
     def session(self) -> int:
         """How many episodes in a row may be alike, since draws stay the same or the player remembers them."""
-        remembered = 1 if self.kind in ("script", "rival", "chance") else self.trials
-        return self.eval.session or remembered
+        remembers = self.kind in ("network", "model", "policy", "")
+        return self.eval.session or (self.trials if remembers else 1)
 
     @property
     def by_seat(self) -> dict[str, PartFigures]:

@@ -1,5 +1,6 @@
 """From runs to what a report says, on experiments with known figures."""
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -98,6 +99,24 @@ def test_conditions_are_paired_by_room(tmp_path: Path) -> None:
     value, low, high = (pairing[name] for name in ("difference", "difference_low", "difference_high"))
     assert value == pytest.approx((1.0 + 0.5 - 1.0) / 3)
     assert -1 <= low < value < high <= 1
+
+
+def test_rooms_of_a_session_are_paired_as_one(tmp_path: Path) -> None:
+    """So episodes that repeat those before them make nobody surer; the difference itself is that of the rooms."""
+
+    def pairing(session: int) -> dict[str, float]:
+        folder = tmp_path / str(session)
+        write_experiment(folder, [condition("A / x", [0.5]), condition("A / y", [0.5])])
+        for name, shift in (("c0-s0", 0), ("c1-s0", 1)):
+            won = {room: (room // session + shift) % 3 > 0 for room in range(12 * session)}
+            write_rooms(folder / "runs" / name, won)
+            result = json.loads((folder / "runs" / name / "result.json").read_text())
+            result["eval"]["session"] = session
+            (folder / "runs" / name / "result.json").write_text(json.dumps(result))
+        (found,) = analyse(read_experiment(folder), {}).sections[0].rooms
+        return {name: found[name] for name in ("difference", "difference_low", "difference_high")}
+
+    assert pairing(5) == pytest.approx(pairing(1))
 
 
 def test_rooms_of_other_programs_are_other_rooms(tmp_path: Path) -> None:
