@@ -160,6 +160,7 @@ def test_a_run_with_a_shipped_agent_trains_nothing_and_leaves_what_a_run_leaves(
     assert not {"metrics.jsonl", "checkpoints"} & files
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     assert (result["agent"], result["frames"]) == (PREFIX + QUICK, 0)
+    assert result["network_sha256"] == checkpoints.network_digest(PREFIX + QUICK)
 
 
 def test_a_scenario_without_an_agent_is_told_which_have_one(tmp_path: Path, capsys: Capture) -> None:

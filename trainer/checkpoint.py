@@ -180,6 +180,16 @@ def read_agent(agent: Path | str) -> Checkpoint:
     return read(saved if saved.is_dir() else path)
 
 
+def network_digest(agent: Path | str) -> str:
+    """SHA-256 of an agent's weights, which its copies share.
+
+    Raises:
+        CheckpointError, ValueError: see `read_agent`.
+    """
+    weights = {name: value.contiguous() for name, value in read_agent(agent).part("net").items()}
+    return hashlib.sha256(safetensors.torch.save(weights)).hexdigest()
+
+
 def _read_file(path: Path) -> Checkpoint:
     try:
         if path.stat().st_size > _FILE_LIMIT:

@@ -59,6 +59,7 @@ from socialai_dsl.runs.folder import (
 )
 from socialai_dsl.trainer.config import (
     HYPER,
+    LEARNS,
     PARTNERS_FOLDER,
     WITHOUT_EFFECT,
     RunConfig,
@@ -225,7 +226,7 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
     Raises:
         ValueError: a folder is not that of a run.
     """
-    grouped: dict[tuple[str, str, str, int | None], list[tuple[dict[str, Any], RunRecord]]] = {}
+    grouped: dict[tuple[str, str, str, int | None, str], list[tuple[dict[str, Any], RunRecord]]] = {}
     called = [folder.name for folder in folders]
     for folder in folders:
         settings = _settings(folder, [])
@@ -237,10 +238,11 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
         run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
         column = ", ".join([_column(settings), *_granted(run.result)])
-        key = str(settings["scenario"]), _scenario_digest(folder), column, _frames_asked(settings)
+        digests = _files_digest(folder, SCENARIO, "*.y*ml"), _networks_digest(folder, settings, run.result)
+        key = str(settings["scenario"]), digests[0], column, _frames_asked(settings), digests[1]
         grouped.setdefault(key, []).append((settings, run))
     conditions = []
-    for (scenario, digest, column, frames), members in grouped.items():
+    for (scenario, digest, column, frames, networks), members in grouped.items():
         settings, first = members[0]
         row = scenario.removeprefix(f"{SCENARIO}/")
         alike = [key for key in grouped if (key[0], key[2]) == (scenario, column)]
@@ -248,12 +250,14 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
             row += f" ({digest[:6]})"  # another file of the same name
         if len({key[3] for key in alike}) > 1:
             column += f", {frames or 0:,} frames"
+        if networks and len({key[4] for key in alike}) > 1:
+            column += f" ({networks[:6]})"  # other networks of the same name
         entry = ConditionEntry(
             name=f"{row} / {column}",
             row=row,
             column=column,
             scenario=scenario_in(first.folder, scenario),
-            agent=str(settings.get("agent", "ppo")),
+            agent=str(settings.get("agent", LEARNS)),
             frames=frames,
             tests=sorted({test for _, run in members for test in run.tests}),
         )
@@ -297,12 +301,20 @@ def _figures(file: Path, name: str) -> Record:
         raise UnreadableError(f"{file}: expected what `{command}` writes; {described(error)}") from None
 
 
-def _scenario_digest(folder: Path) -> str:
-    """Of the scenario's files that the folder keeps, which tells scenarios apart whose files have one name."""
+def _files_digest(folder: Path, below: str, names: str) -> str:
+    """Of copies that the folder keeps, of scenarios or of networks, which tells those apart that have one name."""
     digest = hashlib.sha256()
-    for file in sorted((folder / SCENARIO).rglob("*.y*ml")):
+    for file in sorted((folder / below).rglob(names)):
         digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
+
+
+def _networks_digest(folder: Path, settings: Mapping[str, Any], result: ResultRecord | None) -> str:
+    """Of the networks that played and were there before; one that learnt is another one for each seed."""
+    learnt = settings.get("agent", LEARNS) == LEARNS
+    own = result.network_sha256 if result is not None and not learnt else ""
+    others = _files_digest(folder, PARTNERS_FOLDER, "*") if (folder / PARTNERS_FOLDER).is_dir() else ""
+    return hashlib.sha256(f"{own} {others}".encode()).hexdigest() if own or others else ""
 
 
 def _frames_asked(settings: Mapping[str, Any]) -> int | None:
@@ -313,8 +325,8 @@ def _frames_asked(settings: Mapping[str, Any]) -> int | None:
 
 def _column(settings: Mapping[str, Any]) -> str:
     """Who played, and what of it is not the default."""
-    who = str(settings.get("agent", "ppo"))
-    named = str(settings.get("algorithm", who)) if who == "ppo" else who
+    who = str(settings.get("agent", LEARNS))
+    named = str(settings.get("algorithm", who)) if who == LEARNS else who
     return ", ".join([named, *unusual(settings), *_partners(settings.get("seats"))])
 
 

@@ -79,6 +79,7 @@ class ResultRecord(Record):
 
     Attributes:
         kind: of mind: network, script, chance, model, person or policy; empty where an older version wrote it.
+        network_sha256: of the network that played; empty where none did, or an older version wrote it.
         greedy: whether a network took its most probable actions.
         tell, told: what the player was told of the task, by member of a suite if they differ. language: of that, where
             the file says it. view: what the player saw.
@@ -91,6 +92,7 @@ class ResultRecord(Record):
     """
 
     kind: str = ""
+    network_sha256: str = ""
     greedy: bool = False
     tell: str = "nothing"
     told: str | dict[str, str] = ""

@@ -318,6 +318,7 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "scenario": evaluation.kept or evaluation.scenario,
         "agent": short_name(player.agent),
         "kind": player.kind,
+        **_network(player),
         "greedy": player.greedy,
         "seed": player.seed,
         "trials": evaluation.trials,
@@ -329,6 +330,15 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "program_sha256": evaluation.program.sha256,
         "versions": versions(),
     }
+
+
+def _network(player: Player) -> dict[str, Any]:
+    """Which network played: agents of one name may be several, of other folders or other days."""
+    if not player.is_trained:
+        return {}
+    from socialai_dsl.trainer.checkpoint import network_digest
+
+    return {"network_sha256": network_digest(player.agent)}
 
 
 def _seats(evaluation: Evaluation) -> dict[str, Any]:

@@ -56,6 +56,20 @@ def test_reading_gives_back_what_was_written(session: Session, tmp_path: Path) -
         assert loaded.tensors[name].dtype == value.dtype, name
 
 
+def test_agents_have_one_digest_if_they_have_the_same_weights(session: Session, tmp_path: Path) -> None:
+    """Whatever else their files hold, such as what further training needs, and wherever they are."""
+    written = session.checkpoint()
+    file = write(tmp_path, written)
+    checkpoints.write_file(tmp_path / "copy.safetensors", written.network)
+    other = dict(written.tensors)
+    name = next(name for name in other if name.startswith("net."))
+    other[name] = other[name] + 1
+    checkpoints.write_file(tmp_path / "other.safetensors", replace(written, tensors=other))
+    own = checkpoints.network_digest(file)
+    assert own == checkpoints.network_digest(tmp_path / "copy.safetensors")
+    assert own != checkpoints.network_digest(str(tmp_path / "other.safetensors"))
+
+
 def test_everything_a_run_has_to_remember_is_in_it(session: Session) -> None:
     parts = {name.split(".")[0] for name in session.checkpoint().tensors}
     assert parts == {"net", "adam", "state", "step_scale", "bonus", "rng", "envs"}

@@ -150,6 +150,28 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
         read_runs([tmp_path])
 
 
+@pytest.mark.parametrize("seat", ["agent", "jill"])
+def test_networks_of_one_name_are_seeds_only_if_they_are_the_same(tmp_path: Path, seat: str) -> None:
+    """Whoever plays without learning is told from others by its weights, as are those who play beside it."""
+    folders = [write_run(tmp_path / name, "help", seed, 0.5) for seed, name in enumerate("abc")]
+    for folder, network in zip(folders, ("1", "1", "2"), strict=True):
+        settings = json.loads((folder / "config.json").read_text()) | {"agent": "gate"}
+        result = json.loads((folder / "result.json").read_text())
+        if seat == "agent":
+            result |= {"network_sha256": network}
+        else:
+            settings |= {"seats": {seat: ["partners/jill-0-gate.safetensors"]}}
+            (folder / "partners").mkdir()
+            (folder / "partners" / "jill-0-gate.safetensors").write_text(network)
+        (folder / "config.json").write_text(json.dumps(settings))
+        (folder / "result.json").write_text(json.dumps(result))
+    same, other = read_runs(folders).conditions
+    assert [len(same.runs), len(other.runs)] == [2, 1]
+    assert same.entry.column != other.entry.column
+    (alone,) = read_runs(folders[:2]).conditions
+    assert alone.entry.column == ("gate" if seat == "agent" else "gate, jill by gate")
+
+
 def changed(name: str, value: Any) -> Any:
     """Another value of an option."""
     words = {
