@@ -161,7 +161,9 @@ def train(
                 copied = set(folder.iterdir()) - before
             return _perform(Run(folder), config, loaded, program, False, progress)
         except (ScenarioError, UsageError, RunFailed):
-            if config.trains:
+            ours = {folder / name for name in (CONFIG, *LOCK_FILES)}
+            # What a person or a language model has played stays.
+            if config.trains or set(folder.iterdir()) <= before | copied | ours:
                 _discard_unstarted(folder, copied)
             raise
 

@@ -347,6 +347,13 @@ def test_a_scenario_with_mistakes_is_not_run(capsys: Capture) -> None:
     assert not Path("runs").exists()
 
 
+@pytest.mark.parametrize("agent", ["rival:nobody", "shipped:talkitout"])
+def test_an_agent_that_cannot_play_here_leaves_no_folder(agent: str, capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", "--agent", agent, "--eval-episodes", "2", "--out", "here"]) == 2
+    assert "corridor" in capsys.readouterr().err
+    assert not Path("here").exists(), "the same command can be given again"
+
+
 def test_a_curriculum_with_mistakes_leaves_no_folder(capsys: Capture) -> None:
     Path("phases.yaml").write_text("curriculum: phases\nphases: []\n")
     suite = str(DATA / "suites" / "school.yaml")
