@@ -76,7 +76,7 @@ class Course:
     Attributes:
         kind: what it is like. seconds: that it took, in the study's time. finished: whether it came to the end.
         acts: that it chose. waits: seconds from each act to the next picture, of the clock on the wall.
-        screens: kinds of screens that it saw. left: whether it left by itself.
+        screens: kinds of screens that it saw. left: whether it left by itself. refused: whether the study was full.
         by_chance: acts of an agent that it chose by chance, as the agent does not play there, or failed.
         failures: why a language model failed, and how often.
     """
@@ -88,6 +88,7 @@ class Course:
     waits: list[float] = field(default_factory=list)
     screens: Counter[str] = field(default_factory=Counter)
     left: bool = False
+    refused: bool = False
     by_chance: int = 0
     failures: Counter[str] = field(default_factory=Counter)
 
@@ -106,8 +107,9 @@ class Rehearsal:
     def lines(self, loaded: LoadedStudy) -> Iterable[str]:
         """The report, line by line."""
         done = [one for one in self.courses if one.finished]
-        left = sum(one.left for one in self.courses)
-        yield f"{len(self.courses)} simulated participants, {len(done)} finished, {left} left by themselves"
+        left, refused = (sum(getattr(one, how) for one in self.courses) for how in ("left", "refused"))
+        full = f", {refused} came when the study was full" if refused else ""
+        yield f"{len(self.courses)} simulated participants, {len(done)} finished, {left} left by themselves{full}"
         kinds = dict.fromkeys(one.kind for one in self.courses)
         for kind in kinds:
             own = [one for one in self.courses if one.kind == kind]
@@ -327,7 +329,7 @@ class Simulated:
     async def take_part(self) -> Course:
         """Go from the first page to the last, or as far as this one goes."""
         began = time.monotonic()
-        while not (self._course.finished or self._course.left):
+        while not (self._course.finished or self._course.left or self._course.refused):
             with suppress(ConnectionClosed, OSError):
                 uri = f"ws://{self._at}/seat/{self._code}"
                 async with connect(uri, origin=Origin(f"http://{self._at}"), compression=None) as line:
@@ -358,6 +360,9 @@ class Simulated:
             if screen["do"] == "end":
                 self._course.finished = True
                 return
+            if screen.get("full"):  # like people, who do not wait for a place that may never be free
+                self._course.refused = True
+                return
             answer = await self._answer(screen) if screen["on"] != answered else None
             if answer is None:
                 continue
@@ -383,7 +388,7 @@ class Simulated:
         on = screen["on"]
         match screen["do"]:
             case "consent" | "page":
-                return None if screen.get("full") else {"do": "go", "on": on}
+                return {"do": "go", "on": on}
             case "asked":
                 return {
                     "do": "answers",

@@ -83,6 +83,18 @@ def test_where_an_agent_does_not_play_chance_does_and_the_report_says_it(place: 
     assert f", {course.by_chance} of {course.acts} acts by chance" in "\n".join(found.lines(loaded))
 
 
+def test_whoever_comes_when_the_study_is_full_ends_the_rehearsal_there(place: Path, tmp_path: Path) -> None:
+    loaded = loaded_study(GUIDES + "participants: 1\n", place)
+    found = rehearse(loaded, tmp_path, 3, speed=300, kinds=("script",))
+    assert Counter((one.finished, one.refused) for one in found.courses) == {
+        (True, False): 1,
+        (False, True): 2,
+    }
+    assert next(iter(found.lines(loaded))).endswith(
+        ", 1 finished, 0 left by themselves, 2 came when the study was full"
+    )
+
+
 @pytest.mark.parametrize("answer", ["Act: left", (401, {}, b"no key")])
 def test_a_language_model_takes_part_and_chance_plays_where_it_fails(
     answer: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
