@@ -55,7 +55,7 @@ from socialai_dsl.diagnostics import (
 )
 from socialai_dsl.loader.comments import comments_of
 from socialai_dsl.loader.reader import Library, display_name, read_document
-from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from socialai_dsl.loader.resolved import ResolvedFile, resolve, taken_apart
 from socialai_dsl.schema.annotations import held_at
 from socialai_dsl.schema.curriculum import Curriculum
 from socialai_dsl.schema.files import model_of_file
@@ -656,7 +656,7 @@ def _check_played(
 
 def _is_outside(name: str, folder: Path, span: Span, bag: DiagnosticBag) -> bool:
     """Report a file that does not ship and lies outside the folder of the file that names it; links are followed."""
-    base = Path(name.partition("?")[0].partition("+")[0])
+    base = Path(taken_apart(name)[0])
     if not base.is_absolute():
         return False  # the name of something that ships
     try:

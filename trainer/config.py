@@ -366,8 +366,9 @@ SCENARIO_FOLDER: Final = "scenario"
 
 
 def scenario_file(spec: str) -> Path:
-    """`a/b.yaml+variant?x=1` -> `a/b.yaml`."""
-    return Path(spec.partition("?")[0].partition("+")[0])
+    """`a+b/c.yaml+variant?x=1` -> `a+b/c.yaml`."""
+    path = Path(spec.partition("?")[0])
+    return path.parent / path.name.partition("+")[0]
 
 
 def scenario_in(folder: Path, spec: str) -> str:

@@ -13,6 +13,7 @@ from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
 from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
 from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader.reader import yaml_files
+from socialai_dsl.loader.resolved import taken_apart
 from socialai_dsl.schema.annotations import annotation_at, held_at, literals, model_at, named_by_keys
 from socialai_dsl.schema.files import ScenarioFile, model_of_file
 from socialai_dsl.schema.holds import TEXTS, Holds
@@ -152,7 +153,7 @@ def _named_file(document: Node, cursor: Cursor) -> Path | None:
     value = cursor.path[-1] if cursor.is_key else part_at(document.data, cursor.path)
     if folder is None or held is None or held.kind != "file" or not isinstance(value, str):
         return None
-    name = value.partition("+")[0].partition("?")[0]
+    name = taken_apart(value, folder)[0]
     for candidate in (folder / name, folder / f"{name}.yaml"):
         if candidate.is_file():
             return candidate

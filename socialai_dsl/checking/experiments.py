@@ -13,7 +13,7 @@ from socialai_dsl.diagnostics import DiagnosticBag, advice_on, did_you_mean
 from socialai_dsl.errors import OptionError
 from socialai_dsl.loader.prices import is_table, prices_of
 from socialai_dsl.loader.reader import SUFFIXES, display_name, shipped_folder
-from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names
+from socialai_dsl.loader.resolved import ResolvedFile, looks_like_path, shipped_names, taken_apart
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.schema.experiment import AGENTS, BONUSES, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
@@ -111,12 +111,11 @@ def from_anywhere(name: str, folder: Path) -> str:
     What is neither a path nor the name of something that ships, such as `school/boxes`, means a file beside the one
     that names it.
     """
-    base = name.partition("?")[0]
-    called = base.partition("+")[0]
+    called = taken_apart(name, folder)[0]
     ships = not looks_like_path(called) or _is_in(shipped_folder(), called)
     if called in shipped_names() or (ships and not _is_in(folder, called)):
         return name
-    return os.path.abspath(folder / base) + name[len(base) :]
+    return os.path.abspath(folder / called) + name[len(called) :]
 
 
 def prices_from_anywhere(given: str, folder: Path) -> str:

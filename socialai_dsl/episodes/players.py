@@ -26,6 +26,7 @@ from socialai_dsl.episodes.policies import (
 from socialai_dsl.errors import OptionError, UsageError
 from socialai_dsl.frontend import load
 from socialai_dsl.loader.reader import shipped_folder
+from socialai_dsl.loader.resolved import taken_apart
 from socialai_dsl.model_options import ModelOptions
 from socialai_dsl.runs.folder import CONFIG, agent_of
 from socialai_dsl.trainer.config import LEARNS, MODEL_PREFIX, RIVAL_PREFIX, UNTRAINED
@@ -285,7 +286,7 @@ def named_agent(agent: str, scenario: str) -> str:
     if agent != SHIPPED:
         return played_again(agent)
     path, shipped = load(scenario).resolved.path, shipped_folder().resolve()
-    _, *variants = scenario.partition("?")[0].split("+")
+    _, *variants = taken_apart(scenario)[1].partition("?")[0].split("+")
     known = shipped_agents()
     if path.is_relative_to(shipped):
         base = path.relative_to(shipped).with_suffix("").as_posix()

@@ -109,9 +109,14 @@ def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None
     return ScenarioName(_part(text, 0, plus, start), variants, params)
 
 
-def taken_apart(name: str) -> tuple[str, str]:
-    """A name from outside any file as its base, and the variants and parameters behind it as they are written."""
-    base = parse_name(name, name_source(name).span(1, 1), DiagnosticBag(), Path()).base.text
+def taken_apart(name: str, folder: Path | None = None) -> tuple[str, str]:
+    """A name as its base, and the variants and parameters behind it as they are written.
+
+    Args:
+        name: from outside any file, or of a file in `folder`.
+        folder: where relative paths start, by default the working directory.
+    """
+    base = parse_name(name, name_source(name).span(1, 1), DiagnosticBag(), folder or Path()).base.text
     return base, name[len(base) :]
 
 

@@ -25,6 +25,7 @@ from socialai_dsl.trainer.config import (
     UNTRAINED,
     RunConfig,
     configure,
+    scenario_file,
 )
 
 AUTOMATIC: Final[Mapping[str, str]] = {
@@ -190,7 +191,7 @@ def _usual_recipe(given: Mapping[str, Any], scenario: str, loaded: Loaded) -> st
 
 def _resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:
     """Kind and scale of an exploration bonus; `auto` is the kind that the paper gives the scenario, if any."""
-    name = Path(scenario.partition("?")[0].partition("+")[0]).name.removesuffix(".yaml").removesuffix(".yml")
+    name = scenario_file(scenario).name.removesuffix(".yaml").removesuffix(".yml")
     table = yaml.safe_load(_PAPER_BONUS.read_text(encoding="utf-8"))
     listed = table.get(name, {"kind": "none"})
     if kind == "auto":

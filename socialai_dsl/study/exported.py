@@ -14,6 +14,7 @@ from typing import Any, Final
 from socialai_dsl.atomic import write_json
 from socialai_dsl.errors import UnreadableError, UsageError
 from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.resolved import taken_apart
 from socialai_dsl.schema.study import Question
 from socialai_dsl.study.columns import COLUMNS
 from socialai_dsl.study.replay import PlayedBlock, Row, StudyData
@@ -146,19 +147,13 @@ def _digest(file: Path) -> str:
 
 def _from(scenario: str, out: Path) -> str:
     """A scenario as it is called from the folder of the tables; one that ships is called so everywhere."""
-    base, changes = _split(scenario)
+    base, changes = taken_apart(scenario)
     return Path(os.path.relpath(base, out)).as_posix() + changes if Path(base).is_file() else scenario
-
-
-def _split(scenario: str) -> tuple[str, str]:
-    """The file or name of a scenario, and its variants and parameters."""
-    base = scenario.partition("?")[0].partition("+")[0]
-    return base, scenario[len(base) :]
 
 
 def _block(block: Mapping[str, Any], folder: Path) -> PlayedBlock:
     scenario = block["scenario"]
-    base, changes = _split(scenario)
+    base, changes = taken_apart(scenario, folder)
     if (folder / base).is_file():
         scenario = display_name((folder / base).resolve()) + changes
     endings = [Ending(**one) for one in block["endings"]]

@@ -87,7 +87,7 @@ def short_file(file: str) -> str:
 def short_name(spec: str) -> str:
     """What people call a scenario or an agent: of a file its name, of a folder of this machine the last part."""
     path, mark, parameters = spec.partition("?")
-    is_file = path.partition("+")[0].endswith(SUFFIXES)
+    is_file = Path(path).name.partition("+")[0].endswith(SUFFIXES)
     return (Path(path).name if is_file or Path(path).is_absolute() else path) + mark + parameters
 
 

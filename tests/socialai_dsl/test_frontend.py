@@ -12,6 +12,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
+from socialai_dsl.loader.reader import shipped_folder
 from socialai_dsl.source import Source
 from tests.fuzzing.playground import listening
 
@@ -255,3 +256,25 @@ def test_links_in_a_circle_are_followed_nowhere_beside_an_unsaved_file(
     unsaved = {tmp_path / "draft.yaml": Source("draft.yaml", "scenario: draft\n")}
     assert {found.code for found in check(named, unsaved).diagnostics} <= {"S007", "S504"}
     assert check(named, unsaved).has_errors
+
+
+@pytest.mark.parametrize("folder", ["ab", "a+b", "c++ d"])
+def test_a_folder_may_have_a_plus_in_its_name(folder: str, tmp_path: Path) -> None:
+    """Scenarios are named beside the file, and in a folder below it."""
+    scenario = (shipped_folder() / "help.yaml").read_text(encoding="utf-8")
+    for place in (tmp_path / folder, tmp_path / folder / folder):
+        place.mkdir()
+        (place / "door.yaml").write_text(
+            scenario.replace("scenario: help", "scenario: door"), encoding="utf-8"
+        )
+    (tmp_path / folder / "study.yaml").write_text(
+        "study: doors\nconsent: I agree.\nblocks:\n- {scenario: door.yaml+unsocial, episodes: 1}\n"
+        f"- {{scenario: {folder}/door.yaml, episodes: 1}}\n"
+    )
+    (tmp_path / folder / "experiment.yaml").write_text(
+        "experiment: doors\nabout: Two.\nset: {agent: random}\nconditions:\n"
+        f"- {{name: one, scenario: door.yaml+unsocial}}\n- {{name: two, scenario: {folder}/door.yaml}}\n"
+    )
+    for name in ("study", "experiment"):
+        found = check(tmp_path / folder / f"{name}.yaml")
+        assert [str(one) for one in found.diagnostics if one.severity.name == "ERROR"] == []

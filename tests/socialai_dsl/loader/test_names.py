@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.loader.resolved import ScenarioName, name_source, parse_name
+from socialai_dsl.loader.resolved import ScenarioName, name_source, parse_name, taken_apart
+from socialai_dsl.traces.endings import short_name
+from socialai_dsl.trainer.config import scenario_file
 
 
 def parse(text: str, folder: Path | None = None) -> tuple[ScenarioName, list[str]]:
@@ -75,6 +77,15 @@ def test_files_with_plus_and_question_mark_in_their_names(tmp_path: Path) -> Non
     name, _ = parse("a+b.yaml?k=1", tmp_path)
     assert (name.base.text, list(name.params)) == ("a+b.yaml", ["k"])
     assert parse("c?d.yaml", tmp_path)[0].base.text == "c?d.yaml"
+
+
+@pytest.mark.parametrize(
+    "text", ["dance+u?f=a+b/c", "a+b/c.yaml", "a+b/c.yaml+d?e=1", "/x/a+b/c.yaml+d", "a/b+c"]
+)
+def test_everybody_takes_names_apart_alike(text: str) -> None:
+    base, rest = taken_apart(text)
+    assert scenario_file(text) == Path(base)
+    assert short_name(text) == (Path(base).name + rest if base.endswith(".yaml") else text)
 
 
 @given(st.text("ab+?&=/. \n", max_size=12))
