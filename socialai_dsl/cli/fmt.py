@@ -8,7 +8,7 @@ from typing import Final
 from socialai_dsl.atomic import write_text
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.diagnostics import ScenarioError, render_text
+from socialai_dsl.diagnostics import ScenarioError, is_usage, render_text
 from socialai_dsl.loader.given import STDIN, given_files
 
 SUMMARY: Final = "format scenario files; comments stay"
@@ -35,19 +35,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Format each file; one that cannot be read as YAML is reported and stays as it is."""
-    changed = failed = 0
+    changed = failed = missing = 0
     names = given_files(arguments.paths)
     for name in names:
         try:
             changed += _format(name, arguments.check, arguments.diff)
         except ScenarioError as error:
             failed += 1
+            missing += is_usage(error.diagnostics)
             print(render_text(error.diagnostics, error.sources, shows_color(sys.stderr)), file=sys.stderr)
     if names != [STDIN]:
         verb = "would be changed" if arguments.check or arguments.diff else "changed"
         others = len(dict.fromkeys(names)) - changed - failed
         broken = f", {failed} cannot be read" if failed else ""
         print(f"{changed} {verb}, {others} left as they are{broken}", file=sys.stderr)
+    if missing:
+        return Exit.USAGE
     return Exit.FINDINGS if failed or (arguments.check and changed) else Exit.GOOD
 
 

@@ -60,8 +60,9 @@ def test_what_cannot_be_read_stays_and_the_others_are_formatted(capsys: Capture)
 
 @pytest.mark.parametrize("name", ["nowhere.yaml", "no\x00where"])
 def test_what_is_not_there(name: str, capsys: Capture) -> None:
-    assert main(["fmt", name]) in (1, 2)
+    assert main(["fmt", name, "untidy.yaml"]) == 2, "as `validate` ends"
     assert "S007" in capsys.readouterr().err
+    assert Path("untidy.yaml").read_bytes() == TIDY
 
 
 def test_line_breaks_and_marks_of_other_systems() -> None:
