@@ -168,7 +168,8 @@ def _explain(program: str, error: Exception) -> Exit:
         print(render_text(error.diagnostics, error.sources, color=shows_color(sys.stderr)), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, OptionError):
-        option = f"--hyper {error.name}" if error.name in HYPER else flag(error.name)
+        name = _FLAGS.get(error.name, error.name)
+        option = f"--hyper {name}" if name in HYPER else flag(name)
         error = UsageError(f"{option}: {error.said}")
     for kind, end in _ENDS.items():
         if isinstance(error, kind):
@@ -183,6 +184,9 @@ def _explain(program: str, error: Exception) -> Exit:
     )
     return Exit.INTERNAL
 
+
+_FLAGS: Final = {"seats": "seat"}
+"""An option of a run -> that of the command, where it has another name."""
 
 _ENDS: Final[dict[type[Exception], Exit]] = {
     UsageError: Exit.USAGE,

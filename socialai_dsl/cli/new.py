@@ -16,6 +16,8 @@ EXAMPLES: Final = (
     ("socialai new dance_floor --template imitate", "writes one in which the agent repeats a dance"),
 )
 
+_LISTED: Final = "--list lists the templates and writes nothing"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
@@ -36,7 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the files, and the schema for editors beside them; nothing is written if one of them exists."""
     if arguments.list:
-        refuse(arguments, ("name", "template"), "--list lists the templates and writes nothing")
+        refuse(arguments, ("template",), _LISTED)
+        if arguments.name is not None:
+            raise UsageError(f"NAME: {_LISTED}")
         print("\n".join(columns(list(TEMPLATES.items()))))
         return Exit.GOOD
     if arguments.name is None:

@@ -76,6 +76,8 @@ def test_editors_find_the_schema_beside_the_files(template: str) -> None:
 def test_the_templates_are_listed(capsys: Capture) -> None:
     assert main(["new", "--list"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(TEMPLATES)
+    assert main(["new", "gate", "--list"]) == 2
+    assert "NAME: --list lists the templates" in capsys.readouterr().err
     assert list(Path().iterdir()) == []
     assert main(["new"]) == 2
     assert "expected a NAME" in capsys.readouterr().err

@@ -301,6 +301,10 @@ def test_a_trained_agent_is_evaluated_elsewhere(trained: Path, capsys: Capture) 
             ["corridor.yaml", "--agent", "random", "--recipe", "guided"],
             "--recipe: the agent 'random' is not trained",
         ),
+        (
+            ["corridor.yaml", "--agent", "random", "--seat", "agent=script"],
+            "--seat: the agent 'random' is not trained",
+        ),
         (["corridor.yaml", "--hyper", "lr"], "--hyper: got 'lr', expected NAME=VALUE"),
         (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
         (
