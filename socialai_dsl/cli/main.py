@@ -39,6 +39,7 @@ _COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
+    _open_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     if words and not words[0].startswith("-") and words[0] not in _COMMANDS:
         return _unknown_command(words[0])
@@ -75,6 +76,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return _guarded(parser, words)
 
 
+def _open_streams() -> None:
+    """Have streams that read and write nothing where a parent process has closed the standard ones (`<&-`, `>&-`)."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            nothing = os.open(os.devnull, os.O_RDWR)
+            # Open until the process ends, as the standard ones are.
+            setattr(sys, name, open(nothing, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
+
+
 def _overview(modules: Mapping[str, Any]) -> str:
     """Every command with its summary, grouped by what users do."""
     width = max(map(len, modules))
@@ -102,6 +112,7 @@ def run_alone(program: str, module: Any, argv: Sequence[str] | None = None) -> i
         module: has `SUMMARY`, `add_arguments` and `execute`, as every command does, and perhaps `EXAMPLES`.
         argv: what was typed (default: `sys.argv`).
     """
+    _open_streams()
     parser = _Parser(prog=program, description=_sentence(module.SUMMARY))
     _add_version(parser, sys.argv[1:] if argv is None else argv)
     _add_command(parser, module)

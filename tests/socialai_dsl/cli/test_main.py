@@ -71,6 +71,27 @@ def test_ctrl_c(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     assert capsys.readouterr().err == "socialai: interrupted\n"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="needs a shell")
+@pytest.mark.parametrize(
+    ("closed", "command", "end"),
+    [
+        ("<&-", "fmt -", 0),
+        ("<&-", "play help", 2),
+        (">&-", "schema", 0),
+        ("2>&-", "validate nothing", 2),
+        ("<&- >&- 2>&-", "list talkitout", 0),
+        (">&- 2>&-", "nothing", 2),
+    ],
+)
+def test_closed_standard_streams_change_no_end(closed: str, command: str, end: int) -> None:
+    """A service may start a command without them."""
+    script = f'exec "$0" -W error -m socialai_dsl {command} {closed}'
+    done = subprocess.run(["sh", "-c", script, sys.executable], capture_output=True, check=False, text=True)
+    assert done.returncode == end
+    assert "internal error" not in done.stderr
+    assert "ResourceWarning" not in done.stderr
+
+
 def test_a_reader_that_went_away_is_no_error() -> None:
     script = "import sys; from socialai_dsl.cli.main import main; sys.exit(main(['--help']))"
     # Unbuffered, argparse would meet the broken pipe and keep quiet about it.
