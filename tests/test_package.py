@@ -229,7 +229,7 @@ PARALLEL = (
 TRIED = {
     "": ["socialai validate talkitout", "socialai evaluate random --on cointhief --episodes 2"],
     "lsp": ["socialai lsp"],  # whose input ends at once
-    "report": [f"socialai {RESULTS}", "socialai report --no-baselines results/cointhief"],
+    "report": [f"socialai {RESULTS}", "socialai report results/cointhief"],
     "pettingzoo": [["python", "-c", PARALLEL]],
     "studio": [f"socialai study rehearse {STUDY} --participants 2 --speed 1000"],
     "train": ["socialai-run cointhief --frames 512 --eval-episodes 2 --out run"],

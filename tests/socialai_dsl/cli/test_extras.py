@@ -122,3 +122,26 @@ def test_a_part_of_an_extra_is_not_enough(tmp_path: Path) -> None:
     assert process.stderr == (
         "socialai: training and evaluating need safetensors: pip install 'socialai-dsl[train]'\n"
     )
+
+
+def test_a_report_on_chance_needs_the_extra_report_alone(tmp_path: Path) -> None:
+    """Its baselines are played by the script and at random."""
+    pytest.importorskip("jinja2", reason="reports need the extra report")
+    # Not as a module that is None, which SciPy takes for PyTorch.
+    hidden = """import sys
+class Hidden:
+    def find_spec(self, name, *_):
+        if name in ("torch", "safetensors", "tensorboard"):
+            raise ModuleNotFoundError(name)
+sys.meta_path.insert(0, Hidden())
+"""
+    typed = ["evaluate random --on cointhief --episodes 2 --out played", "report played/cointhief --out page"]
+    done = subprocess.run(
+        [sys.executable, "-c", hidden + COMMANDS, json.dumps(typed)],
+        capture_output=True,
+        check=True,
+        cwd=tmp_path,
+        text=True,
+    )
+    assert [code for code, *_ in json.loads(done.stdout).values()] == [0, 0]
+    assert json.loads((tmp_path / "page" / "baselines.json").read_text())
