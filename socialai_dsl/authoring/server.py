@@ -145,12 +145,13 @@ class Server(LanguageServer):
         return own.line + 1, own.character + 1
 
     def range(self, uri: str, span: Span) -> lsp.Range:
-        """A place as the editor counts."""
-        codec, lines = self.workspace.position_codec, self._lines(uri)
-        if span.line > len(lines):
-            return lsp.Range(lsp.Position(span.line - 1, 0), lsp.Position(span.line - 1, 0))
+        """A place as the editor counts, no part of it behind the end of a line: editors refuse one behind the text."""
+        codec, lines = self.workspace.position_codec, [*self.source(uri).lines()]
+        line, start = span.line - 1, span.column - 1
+        if line >= len(lines):
+            line, start = len(lines) - 1, len(lines[-1])
         first, last = (
-            codec.position_to_client_units(lines, lsp.Position(span.line - 1, span.column - 1 + shift))
+            codec.position_to_client_units(lines, lsp.Position(line, start + shift))
             for shift in (0, span.width)
         )
         return lsp.Range(first, last)

@@ -174,6 +174,7 @@ def session(folder: Path, script: Callable[[Editor], Awaitable[None]]) -> lsp.In
 def test_a_session(tmp_path: Path) -> None:
     async def script(editor: Editor) -> None:
         await findings(editor)
+        await places(editor)
         await completions(editor)
         await hovers(editor)
         await definitions(editor)
@@ -218,6 +219,29 @@ async def findings(editor: Editor) -> None:
     assert elsewhere.message.startswith("base.yaml:3:1: unknown key `horizn`")
     (editor.folder / "base.yaml").write_text(BASE, encoding="utf-8")
     assert await editor.change(SCENARIO) == []
+
+
+async def places(editor: Editor) -> None:
+    """Every finding lies in the text, also in one that is empty or ends in the middle of a line."""
+    for text in (
+        "",
+        "\n",
+        "#",
+        "x",
+        "x:",
+        "scenario: [",
+        "scenario: x\nroom: {size: 🚪",
+        "scenario: x\n- y",
+        "a: 'b",
+        "a: |",
+    ):
+        found = await editor.change(text)
+        assert found, text
+        widths = [len(line.encode("utf-16-le")) // 2 for line in text.split("\n")]
+        for one in found:
+            for place in (one.range.start, one.range.end):
+                assert place.line < len(widths), (text, one)
+                assert place.character <= widths[place.line], (text, one)
 
 
 async def completions(editor: Editor) -> None:
