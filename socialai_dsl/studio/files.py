@@ -131,14 +131,14 @@ class Folder:
         return path
 
     def read(self, name: str) -> tuple[str, str]:
-        """The text of a scenario, and its digest.
+        """The text of a scenario, its lines ended as editors on pages end them, and its digest.
 
         Raises:
             FileError: it cannot be read, or is no text.
         """
         path = self.path(name)
         try:
-            text = read_source(path).text
+            text = "\n".join(read_source(path).lines())
         except ScenarioError as error:
             raise FileError(f"{name}: {error.diagnostics[0].text}") from None
         return text, digest(text)

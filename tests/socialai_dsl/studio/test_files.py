@@ -333,6 +333,19 @@ TestTypists = pytest.mark.filterwarnings("default")(Typists.TestCase)
 TestTypists.settings = settings(max_examples=25, stateful_step_count=20, derandomize=True, deadline=None)
 
 
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_a_text_whose_lines_end_otherwise_is_not_taken_for_a_change_of_it(root: Path, end: str) -> None:
+    """Editors on pages end lines by a line feed, whatever the file does."""
+    text = "scenario: one\nhorizon: 5\n"
+    (root / "one.yaml").write_bytes(text.replace("\n", end).encode())
+    folder = Folder(root)
+    assert folder.read("one.yaml")[0] == text
+    folder.keep_draft("one.yaml", text, folder.read("one.yaml")[1], OTHER)
+    opened = folder.open("one.yaml", WINDOW, ())
+    assert (opened.text, opened.draft, opened.others) == (text, None, [])
+    folder.write("one.yaml", text + "# more\n", opened.digest, WINDOW)
+
+
 def test_what_is_no_text_is_told_in_words(root: Path) -> None:
     (root / "binary.yaml").write_bytes(b"\x00\x01\x02" * 50)
     (root / "large.yaml").write_bytes(b"a" * (5 << 20))
