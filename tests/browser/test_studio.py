@@ -193,6 +193,18 @@ def test_a_mistake_is_underlined_and_the_last_good_room_stays(studio: Page, fold
     assert "horizon: 100 # typed" in (folder / "talkitout.yaml").read_text()
 
 
+def test_long_names_fit_the_screen(studio: Page, folder: Path) -> None:
+    name = "long" * 45 + ".yaml"
+    shutil.copy(folder / "talkitout.yaml", folder / name)
+    studio.reload()
+    drawn(studio)
+    studio.get_by_label("scenario", exact=True).first.select_option(name)
+    studio.get_by_role("heading", name=name).wait_for()
+    for width in (1280, 900, 375):
+        studio.set_viewport_size({"width": width, "height": 800})
+        assert studio.evaluate("document.documentElement.scrollWidth") <= width
+
+
 def test_a_finding_has_its_cure_and_its_page_and_leads_to_its_place(studio: Page) -> None:
     studio.locator(".cm-content").get_by_text("horizon", exact=True).click()
     studio.keyboard.press("End")
