@@ -205,6 +205,16 @@ def test_long_names_fit_the_screen(studio: Page, folder: Path) -> None:
         assert studio.evaluate("document.documentElement.scrollWidth") <= width
 
 
+def test_the_fields_have_the_numbers_of_the_room_that_is_shown(studio: Page) -> None:
+    begin(studio, SEED)
+    for field, wrong in (("seed of the room", "-3"), ("number of the room", "1.5")):
+        studio.get_by_label(field).fill(wrong)
+        studio.keyboard.press("Tab")
+        studio.locator(".message", has_text=wrong).wait_for()
+        assert studio.get_by_label("seed of the room").input_value() == str(SEED)
+        assert studio.get_by_label("number of the room").input_value() == "0"
+
+
 def test_a_finding_has_its_cure_and_its_page_and_leads_to_its_place(studio: Page) -> None:
     studio.locator(".cm-content").get_by_text("horizon", exact=True).click()
     studio.keyboard.press("End")

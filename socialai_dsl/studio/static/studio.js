@@ -458,8 +458,7 @@ class Studio {
     this.players.value = begun.player === "script" && this.isRival(begun.variant) ? begun.variant : ([...this.players.options].find(({ value }) => isCalled(begun.player, value))?.value ?? "me");
     this.seatedAs.textContent = `as ${this.plays.seats.length > 1 ? this.episode.called(this.episode.own) : "the agent"} sees it`;
     this.place = { room: begun.room, variant: begun.variant };
-    this.seedField.value = String(begun.room.seed);
-    this.roomField.value = String(begun.room.index ?? 0);
+    this.numberRoom();
     document.body.dataset.rooms = String(Number(document.body.dataset.rooms ?? 0) + 1);
     const { actions, templates } = this.episode.trace;
     const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
@@ -501,6 +500,13 @@ class Studio {
     this.offerSeats(this.episode.own, this.casting);
     this.offerPlayers();
     this.players.value = "me";
+    this.numberRoom();
+  }
+
+  /** Let the fields have the numbers of the room that is shown. */
+  numberRoom() {
+    this.seedField.value = String(this.place.room.seed);
+    this.roomField.value = String(this.place.room.index ?? 0);
   }
 
   /** Begin in another room, without what was known of the last one. @param {Record<string, any>} room */
