@@ -122,8 +122,10 @@ class Session:
 
     def draw(self, path: str, text: str, room: Room = _FIRST) -> Reply:
         """Check a text that is to stand in a file, and draw its room if it is sound; of tests their scenario's."""
-        kept = self._kept() if self._file == Path(path) else Casting()
-        self._file, self._texts = Path(path), texts_of(path, text)
+        if self._file != Path(path):  # the game of another file is over
+            self._file = self._scenario = Path(path)
+            self._game, self._casting = None, Casting()
+        kept, self._texts = self._kept(), texts_of(path, text)
         found = check(path, self._texts)
         own = display_name(self._file)
         told = [finding(one, own) for one in found.diagnostics]

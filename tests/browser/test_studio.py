@@ -193,6 +193,22 @@ def test_a_mistake_is_underlined_and_the_last_good_room_stays(studio: Page, fold
     assert "horizon: 100 # typed" in (folder / "talkitout.yaml").read_text()
 
 
+def test_a_file_with_mistakes_does_not_show_the_room_of_another_one(studio: Page, folder: Path) -> None:
+    (folder / "empty.yaml").write_text("")
+    (folder / "other.yaml").write_text("scenario: other\n")
+    studio.reload()
+    drawn(studio)
+    files = studio.get_by_label("scenario", exact=True).first
+    for name in ("other.yaml", "empty.yaml"):
+        files.select_option(name)
+        studio.get_by_text("the room is shown when the mistakes are mended").wait_for()
+        for part in (".stage canvas", ".controls output", ".cast"):
+            assert not studio.locator(part).first.is_visible(), part
+    files.select_option("talkitout.yaml")
+    drawn(studio)
+    assert studio.locator(".controls output").first.is_visible()
+
+
 def test_long_names_fit_the_screen(studio: Page, folder: Path) -> None:
     name = "long" * 45 + ".yaml"
     shutil.copy(folder / "talkitout.yaml", folder / name)

@@ -31,6 +31,7 @@ class Studio {
     /** @type {Record<string, string>} who has the other seats in the episode that is shown */ this.casting = {};
     this.length = 0;
     /** @type {Episode | null} */ this.episode = null;
+    /** The file whose room that is. */ this.placedIn = "";
     /** @type {ReturnType<typeof setTimeout> | undefined} */ this.timer = undefined;
     /** @type {Record<string, ReturnType<typeof setTimeout>>} */ this.later = {};
     this.drawing = false;
@@ -442,13 +443,25 @@ class Studio {
       this.episode = null;
       this.tell("");
       this.take(drawn.episode);
-    } else this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
+    } else {
+      if (this.placedIn !== this.name) this.leave();
+      this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
+    }
+  }
+
+  /** Show no room, since the last one was that of another file. */
+  leave() {
+    this.episode = null;
+    this.length = 0;
+    this.root.classList.add("roomless");
   }
 
   /** @param {Reply} begun */
   take(begun) {
     if (this.episode) this.counts.keep(this.episode);
     this.episode = new Episode(begun.trace);
+    this.placedIn = this.name;
+    this.root.classList.remove("roomless");
     this.seat.moments = begun.seats;
     this.counts.names = begun.rules;
     this.length = this.episode.length;

@@ -13,6 +13,7 @@ import yaml
 
 import socialai_dsl as sd
 from socialai_dsl.checking.briefing import UNTOLD
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.episodes.play import AGENT
 from socialai_dsl.llm import Episode, TextView
@@ -53,6 +54,16 @@ def test_mistakes_have_a_place_and_leave_no_room(path: Path) -> None:
     assert "episode" not in drawn
     assert (drawn["findings"][0]["line"], drawn["findings"][0]["error"]) == (7, True)
     assert "horizon" in drawn["findings"][0]["message"]
+
+
+def test_no_game_goes_on_in_another_file_that_has_mistakes(session: Session, path: Path) -> None:
+    other = path.with_name("other.yaml")
+    assert "episode" not in session.draw(str(other), "scenario: other\n")
+    for ask in (session.auto, session.replay, session.layout, session.begin, lambda: session.act("forward")):
+        with pytest.raises((RefusalError, ScenarioError)) as refused:
+            ask()
+        assert "talkitout" not in str(refused.value)
+    assert "episode" in session.draw(str(other), path.read_text().replace("talkitout", "other"))
 
 
 def test_what_is_seen_from_the_seat_is_what_a_model_reads(session: Session, path: Path) -> None:
