@@ -36,6 +36,22 @@ def test_the_menu_leads_to_every_page_and_is_short() -> None:
     assert set(DOCS.rglob("*.md")) - reached == set()
 
 
+@pytest.mark.parametrize(
+    "page", sorted((DOCS / "results").rglob("*.html")), ids=lambda page: page.parent.name
+)
+def test_what_a_report_beside_the_pages_links_to_is_there(page: Path) -> None:
+    """Their runs are not kept, so no report may lead to the episodes of one."""
+    text = page.read_text(encoding="utf-8")
+    inside, named = set(re.findall(r' id="([^"]+)"', text)), re.findall(r' (?:href|src)="([^":]+)"', text)
+    assert named
+    missing = [
+        link
+        for link in named
+        if (link[1:] not in inside if link.startswith("#") else not (page.parent / link).exists())
+    ]
+    assert missing == []
+
+
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("sphinx", reason="install the extra docs")
