@@ -329,6 +329,36 @@ def test_what_was_not_saved_is_there_after_a_reload(studio: Page, folder: Path) 
     assert "a thought" not in (folder / "talkitout.yaml").read_text()
 
 
+def test_what_is_typed_while_another_file_is_read_is_kept(page: Page, server: Server, folder: Path) -> None:
+    held: list[tuple[WebSocketRoute, str]] = []
+
+    def connect(ours: WebSocketRoute) -> None:
+        def pass_on(said: str | bytes) -> None:
+            if isinstance(said, str) and '"read"' in said and "variant: talkitout_oracle" in said:
+                held.append((ours, said))
+            else:
+                ours.send(said)
+
+        ours.connect_to_server().on_message(pass_on)
+
+    page.route_web_socket(re.compile("/session"), connect)
+    page.goto(server.address)
+    drawn(page)
+    files = page.get_by_label("scenario", exact=True).first
+    files.select_option("talkitout_oracle.yaml")
+    until(page, lambda: bool(held))
+    page.locator(".cm-content").click()
+    page.keyboard.type("# typed meanwhile")
+    ((route, said),) = held
+    with another_room(page):
+        route.send(said)
+    until(page, lambda: "# typed meanwhile" in drafts(folder))
+    with another_room(page):
+        files.select_option("talkitout.yaml")
+    assert "# typed meanwhile" in page.locator(".cm-content").inner_text()
+    assert page.get_by_text("not saved; a draft is kept").is_visible()
+
+
 def test_two_windows_do_not_write_over_each_other(studio: Page, folder: Path) -> None:
     (folder / "talkitout.yaml").write_text((folder / "talkitout.yaml").read_text() + "# theirs\n")
     studio.locator(".cm-content").get_by_text("horizon", exact=True).click()

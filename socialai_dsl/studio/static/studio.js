@@ -250,6 +250,7 @@ class Studio {
     const found = await this.line.ask("read", { name });
     if (found.refused) return stay(found.refused);
     const same = name === this.name, back = found.draft !== null;
+    if (!same) this.keep(); // what was typed while the file was read, too
     // A draft is saved against the file that it was begun with, so that what was saved since is not written over unseen.
     Object.assign(this, { name, digest: back ? found.base : found.digest, saved: found.text, place: same ? this.place : { room: { seed: 0 }, variant: "" } });
     if (!same) this.forget();
