@@ -960,13 +960,15 @@ def test_two_people_play_in_browsers_of_their_own(levers: Page, browser: Browser
     other.get_by_role("heading", name="Step 1").wait_for()
 
     other.keyboard.press("Escape")
-    other.keyboard.press("ArrowUp")
+    forward = other.get_by_role("button", name="forward")
+    forward.press("Enter")
     other.get_by_text("you have chosen; waiting for the others").wait_for()
     levers.get_by_text("Bob is here and has chosen").wait_for()
     levers.get_by_label("what to do or say").fill("forward now")
     levers.get_by_label("what to do or say").press("Enter")
     reach(levers, 2)
     other.locator(".transcript li", has_text="Ann: now").wait_for()
+    assert forward.evaluate("button => button === document.activeElement"), "the next step can be chosen likewise"
 
     levers.reload()
     drawn(levers)

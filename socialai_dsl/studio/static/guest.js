@@ -72,7 +72,9 @@ class Guest {
     this.canvas.setAttribute("aria-label", `what ${now.name} sees, 7 by 7 cells; who sees it looks up`);
     this.tell(now.success === null ? "" : now.success ? "✓ success" : "✗ no success");
     this.message.className = `message ${now.success === null ? "" : now.success ? "good" : "bad"}`;
-    this.moves.replaceChildren(...[...now.actions, "none"].map((word) => make("button", { onclick: () => this.choose({ movement: word === "none" ? null : word }) }, word)));
+    const moves = [...now.actions, "none"];
+    if (moves.join() !== [...this.moves.children].map((one) => one.textContent).join()) // buttons that stay keep the focus
+      this.moves.replaceChildren(...moves.map((word) => make("button", { onclick: () => this.choose({ movement: word === "none" ? null : word }) }, word)));
     this.sentences.replaceChildren(...now.phrases.map((/** @type {string} */ said) => make("option", { value: said })));
     this.heard.replaceChildren(...now.heard.map((/** @type {string} */ line) => make("li", {}, line)));
   }
