@@ -842,6 +842,17 @@ def test_everything_has_a_name_for_screen_readers(studio: Page) -> None:
     assert '- textbox "text of talkitout.yaml"' in tree
 
 
+def test_the_keyboard_leaves_the_text_as_the_page_says(studio: Page) -> None:
+    studio.get_by_label("text of talkitout.yaml").focus()
+    studio.keyboard.press("Escape")
+    studio.keyboard.press("Tab")
+    assert studio.evaluate("document.activeElement.closest('.text')") is None
+    assert studio.evaluate("document.activeElement !== document.body")
+    studio.get_by_text("Keys and colours").click()
+    assert studio.get_by_text("In the text Tab indents; Esc leaves it.").is_visible()
+    assert studio.get_by_text("saved", exact=True).is_visible()
+
+
 def test_a_folder_without_scenarios_offers_templates(page: Page, server: Server, folder: Path) -> None:
     for file in folder.glob("*.yaml"):
         file.unlink()
@@ -968,7 +979,9 @@ def test_two_people_play_in_browsers_of_their_own(levers: Page, browser: Browser
     levers.get_by_label("what to do or say").press("Enter")
     reach(levers, 2)
     other.locator(".transcript li", has_text="Ann: now").wait_for()
-    assert forward.evaluate("button => button === document.activeElement"), "the next step can be chosen likewise"
+    assert forward.evaluate("button => button === document.activeElement"), (
+        "the next step can be chosen likewise"
+    )
 
     levers.reload()
     drawn(levers)

@@ -126,7 +126,7 @@ class Studio {
       button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"),
       button("Make a test…", () => this.offerTest(), "keep what was played as a test: what was done, heard and reached"));
     const help = make("details", { class: "panel" }, make("summary", {}, "Keys and colours"),
-      make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
+      make("p", {}, "In the text Tab indents; Esc leaves it. Outside of it: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
     return make("div", { class: "studio" }, bar,
       this.writing.root, this.writing.handle,
       make("main", {}, this.stage.root, this.message,
