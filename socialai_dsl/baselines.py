@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 MOST_EPISODES: Final = 1_000_000
 """The most test episodes of an evaluation: more than anybody waits for, few enough that their results fit in memory."""
 _Z: Final = 1.959963984540054
@@ -46,14 +44,14 @@ def effective_trials(successes: Sequence[float], trials: Sequence[float]) -> flo
     Raises:
         ValueError: there is no cluster, or there are not as many on both sides.
     """
-    won, played = np.asarray(successes, np.float64), np.asarray(trials, np.float64)
-    if len(won) != len(played) or not len(won):
-        raise ValueError(f"got {len(won)} and {len(played)} clusters, expected as many, at least one")
-    clusters, total = len(won), float(played.sum())
-    rate = float(won.sum()) / total
+    if len(successes) != len(trials) or not len(trials):
+        raise ValueError(f"got {len(successes)} and {len(trials)} clusters, expected as many, at least one")
+    clusters, total = len(trials), float(sum(trials))
+    rate = sum(successes) / total
     if total == clusters or clusters == 1 or rate in (0, 1):
         return float(clusters)
-    variance = clusters / (clusters - 1) * float(((won - rate * played) ** 2).sum()) / total**2
+    squares = ((won - rate * played) ** 2 for won, played in zip(successes, trials, strict=True))
+    variance = clusters / (clusters - 1) * math.fsum(squares) / total**2
     if not variance:
         return total
     freedom = (_quantile_of_t(round(total) - 1) / _quantile_of_t(clusters - 1)) ** 2

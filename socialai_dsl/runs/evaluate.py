@@ -318,7 +318,7 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
         "scenario": evaluation.kept or evaluation.scenario,
         "agent": short_name(player.agent),
         "kind": player.kind,
-        **_network(player),
+        "network_sha256": _network(player),
         "greedy": player.greedy,
         "seed": player.seed,
         "trials": evaluation.trials,
@@ -332,13 +332,13 @@ def result_of(evaluation: Evaluation, **more: Any) -> dict[str, Any]:
     }
 
 
-def _network(player: Player) -> dict[str, Any]:
-    """Which network played: agents of one name may be several, of other folders or other days."""
+def _network(player: Player) -> str:
+    """Digest of the network that played, if one did: agents of one name may be several, of other folders or days."""
     if not player.is_trained:
-        return {}
+        return ""
     from socialai_dsl.trainer.checkpoint import network_digest
 
-    return {"network_sha256": network_digest(player.agent)}
+    return network_digest(player.agent)
 
 
 def _seats(evaluation: Evaluation) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
 def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
     """Record up to `count` successes and as many failures, a page with them included, and list all episodes.
 
-    Recordings that an earlier evaluation left there go, as its page and its lists do.
+    Recordings and page of an earlier evaluation go, unless its episodes were the same.
 
     Args:
         evaluation: what was played.
@@ -47,9 +47,12 @@ def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label
     """
     place = folder / scenario_folder_name(evaluation.scenario)
     place.mkdir(parents=True, exist_ok=True)
-    for file in place.iterdir():
-        if file.name == REPLAY or _RECORDING.fullmatch(file.name):
-            file.unlink()
+    before = (place / EPISODES).read_bytes() if (place / EPISODES).is_file() else b""
+    write_tables(evaluation, place)
+    if (place / EPISODES).read_bytes() != before:
+        for file in place.iterdir():
+            if file.name == REPLAY or _RECORDING.fullmatch(file.name):
+                file.unlink()
     replayed = evaluation.to_replay(count)
     for number in replayed:
         if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
@@ -60,7 +63,6 @@ def write_recordings(evaluation: Evaluation, folder: Path, count: int = 3, label
         episode.save_film(place / f"{name}.gif")
     if traces := evaluation.traces(replayed):
         write_text(place / REPLAY, replay_page(traces))
-    write_tables(evaluation, place)
     return place
 
 

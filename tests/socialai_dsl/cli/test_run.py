@@ -80,6 +80,7 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
         "agent",
         "seed",
         "kind",
+        "network_sha256",
         "greedy",
         "view",
         "feedback",
