@@ -55,7 +55,9 @@ class Consequences:
             return True
         if not self._lost or code not in _OF_NAMES | _OF_TEXTS | _OF_PARTS:
             return False
-        if any(_is_whole(path) and (path != _GRAMMAR or code in _OF_THE_GRAMMAR) for path in self._lost):
+        # A name like one that is known is a slip, and hardly that of a slot.
+        of_grammar = code in _OF_THE_GRAMMAR and finding.suggestion is None
+        if any(_is_whole(path) and (path != _GRAMMAR or of_grammar) for path in self._lost):
             return True
         if code in _OF_PARTS and any(path != _GRAMMAR for path in self._lost):
             return True

@@ -218,6 +218,27 @@ def test_a_mistake_hides_none_that_has_nothing_to_do_with_it(
     assert made >= 4
 
 
+def test_a_scenario_that_lacks_its_grammar_hides_no_slip(tmp_path: Path) -> None:
+    """A name that nothing is like may be that of a slot, and waits for the grammar; others are told at once."""
+    file = tmp_path / "gate.yaml"
+    file.write_text("""\
+scenario: gate
+room: {size: 6}
+objects:
+  gate: {type: door, place: wall(top)}
+cast:
+  keeper: {frame: duti}
+  agent: {place: anywhere}
+frames:
+  duty: {states: {s: {do: face(agnt), then: [{when: weather == 1, say: Oh}]}}}
+outcome:
+  - success: agent.at(gat)
+""")
+    found = {d.suggestion for d in check(str(file)).diagnostics}
+    assert found == {None, "duty", "agent", "gate"}
+    assert not any("weather" in d.text for d in check(str(file)).diagnostics)
+
+
 def test_a_member_misspelt_in_the_cast_gives_one_error(scenarios: Path) -> None:
     """It may stand anywhere where the name is used, and says how the cast spells it."""
     made = 0
