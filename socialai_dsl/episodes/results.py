@@ -26,7 +26,7 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     return wilson(successes / trials, trials)
 
 
-def interval_over_rooms(won: NDArray[np.bool_]) -> tuple[float, float]:
+def interval_over_rooms(won: NDArray[np.bool_], session: int = 1) -> tuple[float, float]:
     """The 95 % confidence interval of the mean success of several players, or pairs of them, in the same rooms.
 
     It puts the Wilson intervals of the players together by the correlations of their successes, since a hard room is
@@ -36,6 +36,7 @@ def interval_over_rooms(won: NDArray[np.bool_]) -> tuple[float, float]:
 
     Args:
         won: whether each player succeeded in each room, bool (players, rooms).
+        session: how many rooms in a row may be alike, see `EvalResult`; they count as one.
 
     Raises:
         ValueError: there is no room, or no player.
@@ -44,12 +45,16 @@ def interval_over_rooms(won: NDArray[np.bool_]) -> tuple[float, float]:
         raise ValueError(f"won: got the shape {won.shape}, expected at least one player and one room")
     players, rooms = won.shape
     rates = won.mean(axis=1)
-    deviations = won - rates[:, None]
+    firsts = np.arange(0, rooms, session)
+    played = np.diff(firsts, append=rooms)
+    successes = np.add.reduceat(won, firsts, axis=1, dtype=np.float64)  # (players, sessions)
+    deviations = successes - rates[:, None] * played
     spread = np.sqrt((deviations**2).sum(axis=1))
     scale = np.outer(spread, spread)
     together = np.divide(deviations @ deviations.T, scale, out=np.ones_like(scale), where=scale > 0)
     np.fill_diagonal(together, 1.0)
-    ends = np.array([wilson_interval(int(successes), rooms) for successes in won.sum(axis=1)])
+    effective = [effective_trials(one.tolist(), played.tolist()) for one in successes]
+    ends = np.array([wilson(float(rate), trials) for rate, trials in zip(rates, effective, strict=True)])
     down, up = (np.abs(ends[:, side] - rates) / players for side in (0, 1))
     mean = float(rates.mean())
     low, high = (math.sqrt(max(0.0, float(gap @ together @ gap))) for gap in (down, up))

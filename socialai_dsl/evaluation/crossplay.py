@@ -57,7 +57,7 @@ class CrossPlay:
 
     def rate(self, pair: tuple[int, int], seat: str) -> Rate:
         """The share of a pair's episodes that were a success of a seat."""
-        return _rate(self._won([pair], seat))
+        return self._rate([pair], seat)
 
     def with_themselves(self, seat: str) -> Rate | None:
         """Mean success of the players with themselves; None where nobody plays with itself."""
@@ -69,7 +69,11 @@ class CrossPlay:
 
     def _mean(self, pairs: Sequence[tuple[int, int]], seat: str) -> Rate | None:
         pairs = [pair for pair in pairs if pair not in self.recorded]
-        return _rate(self._won(pairs, seat)) if pairs else None
+        return self._rate(pairs, seat) if pairs else None
+
+    def _rate(self, pairs: Sequence[tuple[int, int]], seat: str) -> Rate:
+        won, session = self._won(pairs, seat), max(self.results[pair].session for pair in pairs)
+        return Rate(float(won.mean()), *interval_over_rooms(won, session))
 
     def _won(self, pairs: Sequence[tuple[int, int]], seat: str) -> NDArray[np.bool_]:
         """Whether each episode of these pairs was a success of a seat, bool (pairs, episodes)."""
@@ -129,10 +133,6 @@ class Rate(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.success:.2f} [{self.low:.2f}, {self.high:.2f}]"
-
-
-def _rate(won: NDArray[np.bool_]) -> Rate:
-    return Rate(float(won.mean()), *interval_over_rooms(won))
 
 
 def cross_play(

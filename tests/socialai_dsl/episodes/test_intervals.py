@@ -17,6 +17,13 @@ def test_playing_twice_the_same_says_nothing_more() -> None:
     assert interval_over_rooms(np.repeat(won, 4, axis=0)) == pytest.approx(interval_over_rooms(won))
 
 
+def test_rooms_that_repeat_those_before_them_say_nothing_more() -> None:
+    generator = np.random.default_rng(1)
+    won = generator.random((3, 100)) < np.array([[0.9], [0.6], [0.2]])
+    found = interval_over_rooms(np.repeat(won, 5, axis=1), session=5)
+    assert found == pytest.approx(interval_over_rooms(won), abs=0.005)
+
+
 def test_players_who_always_win_may_share_their_luck() -> None:
     low, high = interval_over_rooms(np.ones((3, 60), np.bool_))
     assert (low, high) == pytest.approx(wilson_interval(60, 60))
