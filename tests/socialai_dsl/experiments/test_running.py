@@ -58,7 +58,7 @@ def test_all_runs_come_to_their_end(place, capsys):
     assert len(runs) == 3
     assert {run.status.state for run in runs.values()} == {"done"}
     assert all(reasons(run) == ["done"] for run in runs.values() if run.condition["agent"] == "ppo")
-    assert runs["chance, seed 0"].tested == {"help": {"success_rate": 0.5}}
+    assert runs["chance, seed 0"].tested == {"help": {"success_rate": 0.5, "program_sha256": None}}
     assert "3 done" in capsys.readouterr().out
 
 
