@@ -59,7 +59,10 @@ def effective_trials(successes: Sequence[float], trials: Sequence[float]) -> flo
 
 
 def _quantile_of_t(freedom: int) -> float:
-    """The two-sided 95 % quantile of Student's t: the probability is a finite sum (Abramowitz and Stegun 26.7.3, 4)."""
+    """The two-sided 95 % quantile of Student's t, without SciPy, which only the extra `report` installs.
+
+    The probability is a finite sum (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4).
+    """
     low, high = 0.0, math.pi / 2
     for _ in range(53):
         angle = (low + high) / 2

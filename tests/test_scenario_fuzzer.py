@@ -20,11 +20,11 @@ from tests.reference.vocabulary import LONGEST, Words
 from tests.scenario_fuzzer import write, write_asking, write_furnished
 
 
-def compare(folder: Path, seed: int, episodes: int) -> int:
-    """Write, check and play the scenario of a seed on both sides; the number of steps."""
-    path = folder / f"random_{seed}.yaml"
-    path.write_text(write(seed), encoding="utf-8")
-    pair = Pair.of(load(str(path)), number_words=False)
+def compare(folder: Path, seed: int, episodes: int, furnished: bool = False) -> int:
+    """Write, check and play the scenario of a seed, perhaps in several files, on both sides; the number of steps."""
+    for name, text in (write_furnished(seed) if furnished else {f"random_{seed}.yaml": write(seed)}).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    pair = Pair.of(load(str(folder / f"random_{seed}.yaml")), number_words=False)
     rng = np.random.default_rng(seed)
     return sum(pair.play(seed, episode, rng) for episode in range(episodes))
 
@@ -45,20 +45,11 @@ def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None
         compare(tmp_path, seed, episodes=2)
 
 
-def compare_furnished(folder: Path, seed: int, episodes: int) -> int:
-    """The same of a scenario in several files, with more keys; the number of steps."""
-    for name, text in write_furnished(seed).items():
-        (folder / name).write_text(text, encoding="utf-8")
-    pair = Pair.of(load(str(folder / f"random_{seed}.yaml")), number_words=False)
-    rng = np.random.default_rng(seed)
-    return sum(pair.play(seed, episode, rng) for episode in range(episodes))
-
-
 @pytest.mark.parametrize(
     "first", one_in(3, range(50_000, 50_060, 10), "plays random scenarios on the slow interpreter")
 )
 def test_random_scenarios_of_several_files_agree(tmp_path: Path, first: int) -> None:
-    steps = [compare_furnished(tmp_path, seed, episodes=2) for seed in range(first, first + 10)]
+    steps = [compare(tmp_path, seed, episodes=2, furnished=True) for seed in range(first, first + 10)]
     assert sum(steps) > 10 * 10, "the episodes were too short to mean anything"
 
 
@@ -67,7 +58,7 @@ def test_random_scenarios_of_several_files_agree(tmp_path: Path, first: int) -> 
 @pytest.mark.parametrize("first", range(50_000, 53_000, 500))
 def test_three_thousand_random_scenarios_of_several_files_agree(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
-        compare_furnished(tmp_path, seed, episodes=2)
+        compare(tmp_path, seed, episodes=2, furnished=True)
 
 
 def compare_questions(folder: Path, seed: int) -> int:

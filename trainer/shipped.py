@@ -20,7 +20,7 @@ def agents_folder() -> Path:
 
 
 def agent_name(scenario: str, *variants: str) -> str:
-    """The name under which the agent of a scenario ships, or of a variant of it: `talkitout_marked`."""
+    """The name under which the agent of a scenario ships, or of a variant of it: `scenario_variant`."""
     return "_".join([scenario, *variants])
 
 

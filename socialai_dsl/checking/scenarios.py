@@ -138,9 +138,9 @@ def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag
     """The value that the default is, or, where values have labels, stands for."""
     if isinstance(choices, dict) and default in choices.values():
         return default
-    labels = list(map(_spelt, choices)) if isinstance(choices, dict | list) else [_spelt(default)]
-    if _spelt(default) not in labels:
-        advice = advice_on(_spelt(default), labels, "one of " + ", ".join(labels))
+    labels = list(map(spelt, choices)) if isinstance(choices, dict | list) else [spelt(default)]
+    if spelt(default) not in labels:
+        advice = advice_on(spelt(default), labels, "one of " + ", ".join(labels))
         span = resolved.tree.value_span(("params", name, "default"))
         message = f"the default of `{name}` is none of its values"
         bag.error("S206", message, span, **advice)
@@ -158,14 +158,14 @@ def _given(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag:
     if isinstance(choices, list):
         found = [choice for choice in choices if _means(text, choice)]
         if not found:
-            hint = "one of " + ", ".join(map(_spelt, choices))
+            hint = "one of " + ", ".join(map(spelt, choices))
             bag.error("S206", f"`{text}` is none of the values of `{name}`", span, hint=hint)
         return found[0] if found else default
     if isinstance(default, str) and text:
         return text
     value = read_plain(text).value
     if choices is None and not _alike(value, default):
-        message = f"`{text}` is not of the kind of the default of `{name}`, `{_spelt(default)}`"
+        message = f"`{text}` is not of the kind of the default of `{name}`, `{spelt(default)}`"
         bag.error("S206", message, span)
         return default
     return value
@@ -177,11 +177,6 @@ def _means(text: str, choice: Data) -> bool:
         return text == choice
     value = read_plain(text).value
     return _alike(value, choice) and value == choice
-
-
-def _spelt(value: Data) -> str:
-    """A value as YAML spells it."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _alike(value: Data, default: Data) -> bool:

@@ -333,7 +333,7 @@ class Expressions(Emitter):
         return self._found(self._digit(number, digit), digit)
 
     def _container(self, term: terms.FieldOf) -> int:
-        """What a thing lies in, or lay in last; nothing is 0, which fails, or is as good as the first holder."""
+        """What a thing lies in, or lay in last; 0 if it never did: the condition fails, or the first holder counts."""
         if isinstance(term.entity, Const):
             number = entity_register(term.entity.value, Field.INSIDE)
         else:

@@ -262,7 +262,7 @@ class ScenarioEnv(Copied, gymnasium.Env[Observation, NDArray[np.int64]]):
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         seed = None if seed is None else whole_number("seed", seed, 0, MAX_SEED)
-        before = None if self._company is None else self._company.playing
+        before = None if self._company is None else self._company.playing.copy()
         self._table.reset(seed, options)
         super().reset(seed=seed)
         # Still so where `reset_mask` is False.

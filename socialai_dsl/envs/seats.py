@@ -221,8 +221,9 @@ class Company:
 
     @property
     def playing(self) -> NDArray[np.uint64]:
-        """Seed, index and episode of each game, uint64 (E, 3), copied."""
-        return self._table.state.keys[:, : Key.KEY].copy()
+        """Seed, index and episode of each game, uint64 (E, 3): a view of the state."""
+        found: NDArray[np.uint64] = self._table.state.keys[:, : Key.KEY]
+        return found
 
     def begin(self, begun: NDArray[np.bool_], before: NDArray[np.uint64]) -> None:
         """Episodes have begun in some games, bool (E,), after those that were `playing` before."""

@@ -180,7 +180,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             ValueError: a seed, an option or a layout is not what was expected, or says nothing beside another.
             RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
-        before = None if self._company is None else self._company.playing
+        before = None if self._company is None else self._company.playing.copy()
         self._table.reset(seed, options)
         if isinstance(seed, int | np.integer):
             super().reset(seed=int(seed))
@@ -216,7 +216,7 @@ class ScenarioVectorEnv(Copied, VectorEnv[Observation, NDArray[np.int64], NDArra
             return self._table.step(self._task, actions)
         self._table.look("step")
         own = self._table.own_actions(actions, self.num_envs)
-        before = self._company.playing
+        before = self._company.playing.copy()
         ended = self._table.step(self._task, self._company.act(own))
         self._company.begin((self._company.playing != before).any(1), before)
         return ended

@@ -106,7 +106,7 @@ def _of_files(
 
 
 def _says_names(made: dict[str, Any]) -> bool:
-    """Whether somebody may be called by a name, which then is as it was."""
+    """Whether an utterance may name somebody: then names stay as they are."""
     return "whom" in made["grammar"].get("slots", {}) or any("to" in entry for entry in entries(made))
 
 
@@ -155,7 +155,7 @@ def _share(made: dict[str, Any], rng: Random) -> None:
 
 
 def _called(part: Any, name: str, other: str) -> Any:
-    """What is written, with another name for somebody whom attributes are asked of."""
+    """The same text with another name for a member in front of its attributes."""
     if isinstance(part, dict):
         return {key: _called(value, name, other) for key, value in part.items()}
     if isinstance(part, list):

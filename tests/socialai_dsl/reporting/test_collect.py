@@ -152,7 +152,7 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
 
 @pytest.mark.parametrize("seat", ["agent", "jill"])
 def test_networks_of_one_name_are_seeds_only_if_they_are_the_same(tmp_path: Path, seat: str) -> None:
-    """Whoever plays without learning is told from others by its weights, as are those who play beside it."""
+    """Weights tell agents apart that were trained before, on the own seat and on others."""
     folders = [write_run(tmp_path / name, "help", seed, 0.5) for seed, name in enumerate("abc")]
     for folder, network in zip(folders, ("1", "1", "2"), strict=True):
         settings = json.loads((folder / "config.json").read_text()) | {"agent": "gate"}
